@@ -27,6 +27,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.search.selection import Search
+from fieldcal.model.search.variations import drop_superfluous
 
 USUAL, EFFECTS, SEED = 40, 2, 77_000_000
 
@@ -97,10 +98,10 @@ def best_of_these(inferred: InferenceResult, names: tuple[str, ...]) -> Set | No
     """The likeliest set with these effects, alone or beside what else was found."""
     search, members = inferred.search, []
     for name in names:
-        causes = [c for c in inferred.inference.dictionary.causes if c.name == name]
+        causes = [c for c in inferred.fit.dictionary.causes if c.name == name]
         if not causes:
             return None
-        alone = [search.evaluate(((c, c.variants[0]),)) for c in causes]
+        alone = [search.sets.evaluate(((c, c.variants[0]),)) for c in causes]
         members.append(max(alone, key=_weight).members[0])
     beside = [m for m in inferred.best.members
               if m[0].kind == "effect" and m[0].name not in names]  # fmt: skip
@@ -110,14 +111,14 @@ def best_of_these(inferred: InferenceResult, names: tuple[str, ...]) -> Set | No
 
 def _settled(search: Search, members: tuple[Member, ...]) -> Set:
     """The set with those parameters of each cause that raise its weight most."""
-    best = search.evaluate(members)
+    best = search.sets.evaluate(members)
     for _ in range(ROUNDS):
         before = best.score
         for i in range(len(members)):
             best = max(_varied(search, best, i), key=_weight)
         if best.score <= before:
             break
-    return search.drop_superfluous(best.members)
+    return drop_superfluous(search.sets, best.members)
 
 
 def _varied(search: Search, there: Set, i: int) -> Iterator[Set]:
@@ -129,7 +130,7 @@ def _varied(search: Search, there: Set, i: int) -> Iterator[Set]:
     for group in cause.variants:
         members = list(there.members)
         members[i] = (cause, group)
-        yield search.evaluate(tuple(members), there.sizes)
+        yield search.sets.evaluate(tuple(members), there.sizes)
 
 
 def _weight(one: Set) -> float:

@@ -14,6 +14,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
@@ -129,7 +130,7 @@ class Session:
 
     def search(self, off: Array) -> Search:
         """The search over such rows."""
-        return Search(self.dictionary, self.gram(off))
+        return Search(Sets(self.dictionary, self.gram(off)))
 
     def noise(self, rng: np.random.Generator, tau: Array | None = None) -> Array:
         """White noise, and what windows are off by each for itself, (n, 6)."""

@@ -28,7 +28,6 @@ from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.size_average import average_over_sizes
-from fieldcal.model.search.selection import Search
 from fieldcal.physics.effect import CHANCE, Motion, Scatter, Sensor
 
 DIRECTION: dict[Relation, Direction] = {
@@ -99,10 +98,8 @@ def _with_causes(there: WidenedSet, keys: Sequence[str]) -> WidenedSet:
     """A session with some of its causes only, and its estimates with these."""
     some = tuple(m for m in there.set.members if m[0].key in keys)
     kept = tuple(map(with_all_parameters, some))
-    found = there.search.evaluate(kept, Search.sizes_of(there.set, some))
-    return replace(
-        there, set=found, reported_set=average_over_sizes(there.search, found)
-    )
+    found = there.sets.evaluate(kept, there.set.sizes_of(some))
+    return replace(there, set=found, reported_set=average_over_sizes(there.sets, found))
 
 
 def differences(found: DecidedCauses) -> Iterator[Difference]:
@@ -212,7 +209,7 @@ def _determined_parameters(
         for p, v, s, b in zip(params, values, sigma, before, strict=True)
         if s**2 < thresholds.DETERMINED * b**2
     }
-    if there.inference.dictionary.unoriented.all():
+    if there.fit.dictionary.unoriented.all():
         out = found_effects.merge_turned_parameters(
             group, values, covariance, before, out
         )
@@ -225,7 +222,7 @@ def cause_quantities(there: WidenedSet, member: Member) -> dict[str, Quantity]:
     if group.effect is None:
         return {}
     if isinstance(group.effect, Scatter):
-        d = there.inference.dictionary
+        d = there.fit.dictionary
         return random_sizes.random_sizes_of_group(
             there.set, d, group, _size_of(there, member)
         )

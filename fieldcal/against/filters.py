@@ -24,7 +24,7 @@ DIRECTIONS: dict[tuple[bool, bool], Direction] = {
 def filter_difference(found: DecidedCauses) -> Iterator[Difference]:
     """The difference of two filters, by the variances of their impulse responses."""
     both = (found.real, found.sim)
-    groups = [w.inference.dictionary.filters for w in both]
+    groups = [w.fit.dictionary.filters for w in both]
     if groups[0] is None or groups[1] is None:
         return
     (one, cov), (two, more) = (

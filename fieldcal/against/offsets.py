@@ -40,7 +40,7 @@ def earth_rate_difference(found: DecidedCauses) -> Iterator[Difference]:
     In base axes: x East, y down, z north, if the fixture points north. If both show it
     with different headings, an effect of the catalogue covers that.
     """
-    first = [w.inference.dictionary.earth for w in (found.real, found.sim)]
+    first = [w.fit.dictionary.earth for w in (found.real, found.sim)]
     if min(first) < 0:
         return
     (one, cov), (two, more) = (
@@ -106,7 +106,7 @@ def calibration_group(
     values (k,) and covariance (k, k), m/s^2, rad/s or 1, and typical sizes (k,)
 
     """
-    d, nominal = there.inference.dictionary, there.inference.nominal
+    d, nominal = there.fit.dictionary, there.fit.nominal
     first, base = (
         (d.bias, nominal.bias) if name.endswith("bias") else (d.scale, nominal.scale)
     )
@@ -140,9 +140,9 @@ def bias_wander(there: WidenedSet, axes: Index) -> Array:
     It combines the instability from window to window and the rms q sqrt(T / 3) of the
     mean of a random walk.
     """
-    tau = there.search.instability_sigma(there.set.sizes.instability)
+    tau = there.sets.instability_sigma(there.set.sizes.instability)
     square = tau[axes] ** 2
-    length = float(np.ptp(there.inference.dictionary.x.t))
+    length = float(np.ptp(there.fit.dictionary.x.t))
     for member in there.set.members:
         for name, q in cause_quantities(there, member).items():
             if member[0].kind == "random" and name in CHANNELS:
@@ -153,12 +153,12 @@ def bias_wander(there: WidenedSet, axes: Index) -> Array:
 
 def _group(there: WidenedSet, name: str) -> Group | None:
     part, _, cause = name.partition("_")
-    always = there.inference.dictionary.always
+    always = there.fit.dictionary.always
     return next((g for g in always if g.cause == cause and g.part == part), None)
 
 
 def _channels_of_group(there: WidenedSet, group: Group) -> Index:
-    d = there.inference.dictionary
+    d = there.fit.dictionary
     return group.columns - (d.bias if group.cause == "bias" else d.scale)
 
 

@@ -37,9 +37,9 @@ def predict_as_simulated(found: DecidedCauses) -> SimulatorPrediction:
     rows = found.pairing.real.explanation.rows
     columns, values, covariance = _simulator_values(found)
     linear = [p for p in real.linear if p.channel in found.sim.observed]
-    fitted = FittedSet(rows, real.inference.dictionary, linear, real.values, real.set)
+    fitted = FittedSet(rows, real.fit.dictionary, linear, real.values, real.set)
     state = replace(real.set.state, columns=columns, estimate=values)
-    residual = fitted.residual(estimates_by_column(state, real.inference.dictionary))
+    residual = fitted.residual(estimates_by_column(state, real.fit.dictionary))
     squares = _squares(real, linear, columns, values, covariance)
     return _prediction(rows, residual, squares, sum(len(p.white) for p in linear))
 
@@ -71,14 +71,14 @@ def _simulator_values(found: DecidedCauses) -> tuple[Index, Array, Array]:
     columns, base, theirs, wide = [], [], [], list[float]()
     for name, axes in shared_axes(real, sim):
         first = "bias" if name.endswith("bias") else "scale"
-        here, there = (getattr(w.inference.dictionary, first) for w in (real, sim))
-        nominal = [getattr(w.inference.nominal, first) for w in (real, sim)]
+        here, there = (getattr(w.fit.dictionary, first) for w in (real, sim))
+        nominal = [getattr(w.fit.nominal, first) for w in (real, sim)]
         spread = bias_wander(sim, axes) if first == "bias" else np.zeros(len(axes))
         wide += spread.tolist()
         columns += (here + axes).tolist()
         theirs += (there + axes).tolist()
         base += (nominal[1][axes] - nominal[0][axes]).tolist()
-    earth = [w.inference.dictionary.earth for w in (real, sim)]
+    earth = [w.fit.dictionary.earth for w in (real, sim)]
     if min(earth) >= 0:
         columns += list(range(earth[0], earth[0] + 3))
         theirs += list(range(earth[1], earth[1] + 3))
@@ -106,12 +106,12 @@ def _squares(
     covariance: Array,
 ) -> float:
     """Chi squared (1) of the predicted windows."""
-    d = real.inference.dictionary
+    d = real.fit.dictionary
     some = np.flatnonzero(
-        real.inference.wanted_columns(real.set.members) | (real.values != 0)
+        real.fit.wanted_columns(real.set.members) | (real.values != 0)
     )
     rows = gram(linear, d, real.values, (), some)
-    tau = real.search.instability_sigma(real.set.sizes.instability)
+    tau = real.sets.instability_sigma(real.set.sizes.instability)
     weighed = rows.with_instability(tau)
     inner, rhs = weighed.matrix(columns, columns), weighed.rhs(columns)
     left = weighed.square - 2 * values @ rhs + values @ inner @ values

@@ -17,11 +17,10 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
 from fieldcal.model.posterior.size_average import average_over_sizes
-from fieldcal.model.search.inference import Inference
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.system.linear_rows import LinearRows
 
 
@@ -31,8 +30,8 @@ class WidenedSet:
 
     Attributes
     ----------
-    inference : with a dictionary that has the columns of all causes
-    search : linearised about the state of the explanation
+    fit : with a dictionary that has the columns of all causes
+    sets : linearised about the state of the explanation
     set : the causes
     reported_set : the set with the sizes from which estimates are reported
     linear : linearised rows of each channel
@@ -40,8 +39,8 @@ class WidenedSet:
 
     """
 
-    inference: Inference
-    search: Search
+    fit: GaussNewton
+    sets: Sets
     set: Set
     reported_set: Set
     linear: Sequence[LinearRows]
@@ -50,7 +49,7 @@ class WidenedSet:
     @property
     def observed(self) -> Index:
         """Channels that were measured."""
-        return self.inference.dictionary.observed
+        return self.fit.dictionary.observed
 
     def member(self, key: str) -> Member | None:
         """The member of the set with this key; None without it."""
@@ -72,9 +71,9 @@ class WidenedSet:
     def evidence(self, key: str) -> float:
         """Rise of ln Z with a cause, without its prior probability."""
         rest = tuple(m for m in self.set.members if m[0].key != key)
-        less = self.search.evaluate(rest, Search.sizes_of(self.set, rest))
-        found = self.set.score - self.search.set_log_prior(self.set.members)
-        return float(found - less.score + self.search.set_log_prior(rest))
+        less = self.sets.reduced(self.set, rest)
+        found = self.set.score - self.sets.set_log_prior(self.set.members)
+        return float(found - less.score + self.sets.set_log_prior(rest))
 
     def estimate(self, columns: Index) -> tuple[Array, Array]:
         """Values and covariance of some columns of the set."""
@@ -100,8 +99,7 @@ def widen_set(
 
     """
     found = explanation.inferred
-    own = Inference(found.inference.system.independent_copy(), found.inference.nominal)
-    own.turn_rows = list(found.turn_rows)
+    own = found.independent_fit()
     every = list(members)
     for cause, group in others:
         if (more := _counterpart(own, cause, group, later)) is not None:
@@ -111,11 +109,9 @@ def widen_set(
         values != 0
     )
     linear = own.system.linearised(found.state, wanted)
-    search = Search(own.dictionary, own.gram_of(linear, values, wanted))
-    there = search.evaluate(tuple(every), _starting_sizes(found.best, every))
-    return WidenedSet(
-        own, search, there, average_over_sizes(search, there), linear, values
-    )
+    sets = Sets(own.dictionary, own.gram_of(linear, values, wanted))
+    there = sets.evaluate(tuple(every), _starting_sizes(found.best, every))
+    return WidenedSet(own, sets, there, average_over_sizes(sets, there), linear, values)
 
 
 def with_all_parameters(member: Member) -> Member:
@@ -139,7 +135,7 @@ def _starting_sizes(best: Set, every: Sequence[Member]) -> Sizes:
 
 
 def _counterpart(
-    own: Inference, cause: Cause, group: Group, later: float
+    own: GaussNewton, cause: Cause, group: Group, later: float
 ) -> Member | None:
     """The cause of this session that corresponds to one of another; None without it."""
     here = next((c for c in own.dictionary.causes if c.key == cause.key), None)
@@ -157,7 +153,5 @@ def _counterpart(
         alike, key=lambda v: (v.origin != group.origin, abs(v.shape[shape.name] - at))
     )
     here, (exact,) = own.dictionary.add_shape_values(here, near, [at])
-    own.turn_rows = [
-        t.with_copied_columns(near.columns, exact.columns) for t in own.turn_rows
-    ]
+    own.copy_turn_columns(near, exact)
     return here, exact

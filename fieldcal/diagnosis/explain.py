@@ -22,7 +22,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.sinking import NAME as SINKING
 from fieldcal.model.causes.wander import Wander
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.held_out import (
     HeldOut,
@@ -40,12 +40,13 @@ from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import window_starts
 from fieldcal.model.rows.window_bounds import window_bounds
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import (
     TIME_CONSTANT_LOG_LOSS,
     Inference,
     InferenceResult,
 )
-from fieldcal.model.search.selection import MIN_LOG_RISE, Search
+from fieldcal.model.search.selection import MIN_LOG_RISE
 from fieldcal.model.search.settled_scores import correct_scores
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
@@ -96,7 +97,7 @@ class Explanation:
     @cached_property
     def rival_sets(self) -> list[Set]:
         """Sets that may become the best when a position is held out."""
-        visited = list(self.inferred.search.visited.values())
+        visited = list(self.inferred.search.sets.visited.values())
         return candidate_sets(self.best.set, visited)
 
     @cached_property
@@ -121,7 +122,7 @@ class Explanation:
     @cached_property
     def turns(self) -> list[Turn]:
         """The turns, integrated with the best set."""
-        return self.inferred.inference.turns_at(self.state)
+        return self.inferred.fit.turns_at(self.state)
 
     @cached_property
     def turns_held_out(self) -> Array:
@@ -169,10 +170,12 @@ class Explanation:
         """Rise of ln Z by some columns of the best set."""
         if not columns:
             return 0.0
-        found = self.best.set.state
-        kept = ~np.isin(found.columns, columns)
-        less = type(found).of(found.rows, found.columns[kept], found.prior_sigma[kept])
-        return found.score - less.score
+        posterior = self.best.set.state
+        kept = ~np.isin(posterior.columns, columns)
+        less = type(posterior).of(
+            posterior.rows, posterior.columns[kept], posterior.prior_sigma[kept]
+        )
+        return posterior.score - less.score
 
     @property
     def shows_earth_rate(self) -> bool:
@@ -201,43 +204,39 @@ def explain(
 
     The search begins with `before`, the explanation of a part of it, if that is given.
     """
-    inference = build_inference(prepared.source, prepared.rows, prepared)
+    fit = build_fit(prepared.source, prepared.rows, prepared)
+    inference = Inference(fit)
     found = inference.run(None if before is None else _starting_causes(before))
     posterior = _calculate_posterior(found)
     for _ in range(MAX_RESUMPTIONS):
         better, now = found.search.best_visited, found.best
         # the same causes, with shapes between the grid points, are no improvement
-        if found.search.corrected_score(better) <= now.score + (
+        if found.search.sets.corrected_score(better) <= now.score + (
             TIME_CONSTANT_LOG_LOSS if better.keys == now.keys else MIN_LOG_RISE
         ):
             break
         # an alias explains the rows better than the cause that it was an alias of
-        resumed = found.inference.resume(better, found)
+        resumed = inference.resume(better, found)
         if resumed.best.score < now.score:  # about its own state it does not
             break
         found, posterior = resumed, _calculate_posterior(resumed)
-    inference = found.inference
-    windows = inference.system.linearised(found.state)
+    windows = fit.system.linearised(found.state)
     best = FittedSet(
         prepared.rows,
-        inference.dictionary,
+        fit.dictionary,
         windows,
         found.values,
-        average_over_sizes(found.search, found.best),
+        average_over_sizes(found.search.sets, found.best),
     )
-    enlarge_to_shown_grade(inference.dictionary, best.set, prepared.source.about)
+    enlarge_to_shown_grade(fit.dictionary, best.set, prepared.source.about)
     return Explanation(
-        prepared, found, best, fit_calibration_only(inference, prepared.rows), posterior
+        prepared, found, best, fit_calibration_only(fit, prepared.rows), posterior
     )
 
 
 def _calculate_posterior(found: InferenceResult) -> Posterior:
     """Probabilities of the causes found, and of their aliases."""
-    posterior = Posterior(
-        found.search,
-        found.best,
-        lambda there: found.inference.refine_beside(found, there),
-    )
+    posterior = Posterior(found.search, found.best, found.with_refined_shapes)
     correct_scores(found)
     return posterior
 
@@ -256,10 +255,10 @@ def _starting_causes(before: Explanation) -> tuple[Member, ...]:
     return (*members, *((cause, cause.variants[0]) for cause in tilts))
 
 
-def build_inference(
+def build_fit(
     source: RowSource, rows: Rows, prepared: PreparedRecording
-) -> Inference:
-    """Set up the inference of some rows: causes, turns and nominal state."""
+) -> GaussNewton:
+    """Set up the fit of some rows: causes, turns and nominal state."""
     about = source.about
     swayed = any(t.effect.kind == "motion" for t in prepared.spectral_lines)
     turned = bool(about.positions) and not swayed  # a base that rocks turns it as well
@@ -280,7 +279,7 @@ def build_inference(
     rough |= "sway" in prepared.checked.ids
     turning = TurnTracker(source, rows, dictionary.since)
     turns = Turns(turning, dictionary, not rough) if turned else None
-    return Inference(WindowSystem(rows, dictionary), nominal, turns)
+    return GaussNewton(WindowSystem(rows, dictionary), nominal, turns)
 
 
 def nominal_state(
@@ -312,20 +311,20 @@ def times_since_turn(source: RowSource, rows: Rows) -> Array:
     usual = starts - (float(np.median(lead)) if len(lead) else 0.0)
     first = np.arange(len(starts)) == x.position.min()
     instants = [
-        one
-        for each in (arrived, usual)
-        for one in (each, np.where(first, -np.inf, each))
+        instant
+        for arrivals in (arrived, usual)
+        for instant in (arrivals, np.where(first, -np.inf, arrivals))
     ]
     return np.array([x.t - at[x.position] for at in instants])
 
 
-def fit_calibration_only(whole: Inference, rows: Rows) -> FittedSet:
+def fit_calibration_only(whole: GaussNewton, rows: Rows) -> FittedSet:
     """Fit bias and scale factor alone to the windows."""
     d = whole.dictionary.calibration_only()
-    inference = Inference(WindowSystem(rows, d), whole.nominal)
-    start: Array = np.zeros(d.width)
-    state, values, _ = inference.settle(inference.nominal, start, ())
-    wanted = inference.wanted_columns(())
-    linear = inference.system.linearised(state, wanted)
-    found = Search(d, inference.gram_of(linear, values, wanted)).evaluate(())
-    return FittedSet(rows, d, linear, values, found)
+    fit = GaussNewton(WindowSystem(rows, d), whole.nominal)
+    zeros: Array = np.zeros(d.width)
+    state, values, _ = fit.settle(fit.nominal, zeros, ())
+    wanted = fit.wanted_columns(())
+    linear = fit.system.linearised(state, wanted)
+    fitted = Sets(d, fit.gram_of(linear, values, wanted)).evaluate(())
+    return FittedSet(rows, d, linear, values, fitted)

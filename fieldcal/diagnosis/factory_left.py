@@ -35,9 +35,9 @@ def factory_error_groups(
     """
     known = {term.effect.id for term in prepared.known} | {*WARMING_EFFECTS}
     turned = not dictionary.x.oriented.any()
-    for one in factory_groups(dictionary, factory_errors(about), turned):
-        if one.part not in known:
-            yield one
+    for group in factory_groups(dictionary, factory_errors(about), turned):
+        if group.part not in known:
+            yield group
 
 
 def enlarge_to_shown_grade(

@@ -96,11 +96,11 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     rows = rows_of_recording(source)
     _refuse_turning(rows, about)
     lines = find_lines(source, rows)
-    found = tuple(tone for tone, _ in lines)
+    tones = tuple(tone for tone, _ in lines)
     left = tuple(remains for _, remains in lines)
-    if found:
+    if tones:
         source = replace(
-            source, block=subtract_lines(source.block, source, rows, found)
+            source, block=subtract_lines(source.block, source, rows, tones)
         )
         rows = _with_vibration(rows_of_recording(source), rows)
         checked = recheck_without_lines(checked, source.block, about)
@@ -110,7 +110,7 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
             " clipped there; record them again"
         )
     return PreparedRecording(
-        checked, source, _without_constant_temperature(rows, warmth), known, found, left
+        checked, source, _without_constant_temperature(rows, warmth), known, tones, left
     )
 
 

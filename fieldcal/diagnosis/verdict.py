@@ -145,23 +145,25 @@ def _effects(
     explanation: Explanation, lost: Mapping[str, CauseRemoval], then: ModelResiduals
 ) -> list[FoundEffect]:
     prepared = explanation.prepared
-    found = list(sample_effects.effects_of_faults(prepared.checked.faults))
+    effects = list(sample_effects.effects_of_faults(prepared.checked.faults))
     for tone, left in zip(
         prepared.spectral_lines, prepared.line_remainders, strict=True
     ):
-        found.append(
+        effects.append(
             sample_effects.effect_of_line(tone, left.gain(tone.clear_channels))
         )
-    for one in explanation.probable_causes:
-        if one.name in catalogue():
-            found.append(
-                found_effects.effect_of_cause(explanation, one, lost[one.name], then)
+    for cause in explanation.probable_causes:
+        if cause.name in catalogue():
+            effects.append(
+                found_effects.effect_of_cause(
+                    explanation, cause, lost[cause.name], then
+                )
             )
-    found += found_filters(explanation)
+    effects += found_filters(explanation)
     if explanation.each_window_shows_earth_rate:
         evidence = {"delta_chi2": 2 * explanation.earth_rate_evidence}
-        found.append(FoundEffect("earth_rate", {}, evidence=evidence))
-    return found
+        effects.append(FoundEffect("earth_rate", {}, evidence=evidence))
+    return effects
 
 
 def _without_effect(
@@ -169,10 +171,10 @@ def _without_effect(
 ) -> list[UnknownMismatch]:
     """Mismatches of causes that are not effects of the catalogue."""
     out = []
-    for one in explanation.probable_causes:
-        if one.name not in catalogue():
-            places = list(mismatches.of_unknown(explanation, one, lost[one.name]))
-            out += unknown_mismatches(explanation, one, places)
+    for cause in explanation.probable_causes:
+        if cause.name not in catalogue():
+            places = list(mismatches.of_unknown(explanation, cause, lost[cause.name]))
+            out += unknown_mismatches(explanation, cause, places)
     return out
 
 
@@ -184,7 +186,7 @@ def _verdict(
 ) -> Verdict:
     if strange or odd:
         return "unexplained"
-    if any(_is_open(explanation, one) for one in explanation.probable_causes):
+    if any(_is_open(explanation, cause) for cause in explanation.probable_causes):
         return "ambiguous"
     if effects:
         return "left_out"
@@ -196,12 +198,12 @@ def _impossible_facts(explanation: Explanation) -> list[str]:
 
     Either means that the description of the recording is wrong.
     """
-    found = calibration_of_set(explanation, explanation.best.set)
+    calibration = calibration_of_set(explanation, explanation.best.set)
     nominal = explanation.prepared.source.about.nominal
     values = implausible_values(
-        tuple(found),
-        np.array([value for value, _, _ in found.values()]),
-        np.array([sigma for _, sigma, _ in found.values()]),
+        tuple(calibration),
+        np.array([value for value, _, _ in calibration.values()]),
+        np.array([sigma for _, sigma, _ in calibration.values()]),
         Nominal(**{k: tuple(v.tolist()) for k, v in nominal.items()}),
     )
     return values + misdirected_turns(_unexplained_turns(explanation))
@@ -224,11 +226,11 @@ def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
     return out
 
 
-def _is_open(explanation: Explanation, one: ProbableCause) -> bool:
+def _is_open(explanation: Explanation, cause: ProbableCause) -> bool:
     """Whether an alias, or bias and scale factor, may explain what a cause does."""
-    if one.name in catalogue() and catalogue()[one.name].like_calibration:
+    if cause.name in catalogue() and catalogue()[cause.name].like_calibration:
         return True
-    others = explanation.posterior.probability(one.aliases, one.triads)
+    others = explanation.posterior.probability(cause.aliases, cause.triads)
     return others > thresholds.MENTIONED
 
 
@@ -243,11 +245,11 @@ def _probability(explanation: Explanation, verdict: Verdict) -> float:
         return posterior.probability_of_noise_alone
     if verdict == "ambiguous" and explanation.undecided:
         return 1 - posterior.probability_of_noise_alone
-    wanted = [{one.name, *one.alike} for one in explanation.probable_causes]
+    wanted = [{cause.name, *cause.alike} for cause in explanation.probable_causes]
     return sum(
         w
         for s, w in posterior.weights
-        if all(some & set(posterior.cause_names(s)) for some in wanted)
+        if all(names & set(posterior.cause_names(s)) for names in wanted)
     )
 
 
@@ -261,9 +263,9 @@ def _all_mismatches(
     windows = window_bounds(block, prepared.source.about)
     out = list(mismatches.of_faults(block.t, windows, prepared.checked.faults))
     out += mismatches.of_tones(explanation)
-    for one in explanation.probable_causes:
-        if one.name in catalogue():
-            out += mismatches.of_cause(explanation, one, lost[one.name])
+    for cause in explanation.probable_causes:
+        if cause.name in catalogue():
+            out += mismatches.of_cause(explanation, cause, lost[cause.name])
     out += [u.mismatch for u in strange]
     return sorted(out, key=lambda m: -m.sigma)
 
@@ -271,14 +273,14 @@ def _all_mismatches(
 def _undetermined(explanation: Explanation) -> list[str]:
     """Full names of parameters of the causes found that the rows do not determine."""
     out = []
-    for one in explanation.probable_causes:
-        effect = catalogue().get(one.name)
+    for cause in explanation.probable_causes:
+        effect = catalogue().get(cause.name)
         if effect is None:
             continue
-        told = found_effects.parameter_estimates(explanation, one)
-        for _, group in one.members:
+        estimates = found_effects.parameter_estimates(explanation, cause)
+        for _, group in cause.members:
             names = [effect.params[j].name for j in group.params]
-            out += [f"{one.name}.{n}" for n in names if n not in told]
+            out += [f"{cause.name}.{n}" for n in names if n not in estimates]
     return out
 
 
@@ -308,7 +310,7 @@ def _warnings(explanation: Explanation) -> tuple[str, ...]:
 
 def _degrees_of_freedom(explanation: Explanation, first: int) -> int:
     """Number of window means less number of parameters, for one triad."""
-    rows, found = explanation.rows, explanation.best.set.state
+    rows, posterior = explanation.rows, explanation.best.set.state
     part = slice(first, first + 3)
     held = [
         rows.used[rows.x.position == p][:, part].any(axis=0).sum()
@@ -323,5 +325,7 @@ def _degrees_of_freedom(explanation: Explanation, first: int) -> int:
     for cause, group in explanation.best.set.members:
         if not cause.reportable:  # noise is no parameter
             reach[group.columns] = False
-    narrowed = np.diag(found.inverse) < thresholds.DETERMINED * found.prior_sigma**2
-    return int(sum(held) - turns - (reach[found.columns] & narrowed).sum())
+    narrowed = (
+        np.diag(posterior.inverse) < thresholds.DETERMINED * posterior.prior_sigma**2
+    )
+    return int(sum(held) - turns - (reach[posterior.columns] & narrowed).sum())

@@ -32,7 +32,6 @@ from fieldcal.diagnosis.signal.chain import find_in_recorded_samples
 from fieldcal.diagnosis.wording.paragraph import angle_errors_text, exchange_text
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
-from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.physics.effect import Chain, Scatter
 from fieldcal.session.folder import Session
@@ -163,8 +162,7 @@ def _shift_sigmas(
     names = {s.name for s in out}
     best = explanation.posterior.best
     kept = tuple(m for m in best.members if m[0].name not in names)
-    search = explanation.posterior.search
-    less: Set = search.evaluate(kept, search.sizes_of(best, kept))
+    less = explanation.posterior.sets.reduced(best, kept)
     now, before = (calibration_of_set(explanation, one) for one in (best, less))
     return {
         name: float((now[name][0] - before[name][0]) / before[name][1])

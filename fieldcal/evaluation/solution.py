@@ -48,7 +48,7 @@ from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.explanations import WeightedExplanation
-from fieldcal.solve.rows import mean_variances, with_window_variances
+from fieldcal.solve.observation_rows import mean_variances, with_window_variances
 from fieldcal.solve.words import RECORD_TURNS
 from fieldcal.windows.dead_band import dead_band_messages
 

@@ -27,6 +27,7 @@ from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.search.set_at_instability import with_typical_calibration
 
 MAX_LOG_TIME_DISTANCE = 0.1
 """Largest distance of a session's time constant from a power of two, ln."""
@@ -102,8 +103,9 @@ class ReducedSession:
 
 def reduce_session(explanation: Explanation) -> ReducedSession:
     """Reduce a session by its explanation, (1)."""
-    search, best = explanation.posterior.search, explanation.inferred.best
-    wide, _ = search.with_typical_calibration(best)
+    best = explanation.inferred.best
+    dictionary = explanation.inferred.fit.dictionary
+    wide, _ = with_typical_calibration(dictionary, best)
     own = np.ones(len(wide), dtype=bool)
     first = len(wide) - sum(len(g.columns) for _, g in best.members)
     for cause, group in best.members:
@@ -114,7 +116,7 @@ def reduce_session(explanation: Explanation) -> ReducedSession:
     less = Eliminated.of(state.rows, state.columns[own], wide[own])
     groups = [
         found
-        for cause in search.dictionary.causes
+        for cause in dictionary.causes
         if _shareable(cause)
         for found in _groups_on_common_grid(cause)
     ]

@@ -93,8 +93,8 @@ class State:
         out: Array = self.bias + self.scale * np.hstack([x.f, x.w])
         for term in self.terms:
             if isinstance(term.effect, Sensor):
-                seen = replace(x, since_turn=since[term.origin])
-                design = term.effect.design(seen, term.shape or NO_SHAPE)
+                since_origin = replace(x, since_turn=since[term.origin])
+                design = term.effect.design(since_origin, term.shape or NO_SHAPE)
                 out = out + design @ term.values
         return out
 
@@ -130,8 +130,8 @@ def tilt_positions(x: Experience, attitude: Array) -> Experience:
     """Rows with a small rotation of each position about the base's axes, (p, 3) rad."""
     moved = np.flatnonzero(attitude.any(axis=1))
     first = np.array([int(np.argmax(x.position == p)) for p in moved])
-    there = x.position[first] == moved
-    first, moved = first[there], moved[there]
+    present = x.position[first] == moved
+    first, moved = first[present], moved[present]
     held = direction_cosines(x.alpha[first], x.beta[first], x.gamma[first])
     angles = angles_of_direction_cosines(
         held @ np.swapaxes(rotation_matrices(attitude[moved]), 1, 2)

@@ -122,7 +122,7 @@ class ExpectedGain:
         angles: float,
     ) -> None:
         self.rows, self.found, self.angles = rows, found, angles
-        self.dictionary: Dictionary = found.inference.dictionary
+        self.dictionary: Dictionary = found.fit.dictionary
         self.quantities = dict(self._requested_quantities(allowed))
         self.explanations = self._eliminated_explanations(likely)
 
@@ -231,7 +231,7 @@ class ExpectedGain:
         return np.concatenate(at), np.concatenate(wide)
 
     def _weighed_rows(self, one: Set) -> WeightedGram:
-        return self.found.search.gram_at(one.sizes.instability)
+        return self.found.search.sets.gram_at(one.sizes.instability)
 
     # -- requested quantities and further windows
 

@@ -96,7 +96,7 @@ class TriadFit:
 
 
 def triad_agreement(
-    gram: Gram, d: ParameterSet, found: Mixture, channels: tuple[int, ...]
+    gram: Gram, d: ParameterSet, fitted: Mixture, channels: tuple[int, ...]
 ) -> TriadFit:
     """Compare the means of a triad with the estimate."""
     p = len(d.window_positions)
@@ -105,31 +105,37 @@ def triad_agreement(
     used = (info > 0).ravel()
     if not used.any():
         return TriadFit(0.0, 0, np.nan, np.nan, np.full((p, 3), np.nan))
-    index = gram.index[found.columns]
+    index = gram.index[fitted.columns]
     means = gram.means[:p, list(channels)][:, :, index].reshape(-1, len(index))[used]
     y = mean_residual.ravel()[used]
     random = _random_columns(d)
     noise = (1 / info.ravel()[used]) + gram.shared[at].ravel()[used] ** 2
     loose = _free_rotations(gram, p, channels)[used]
-    wide = means[:, random] * found.prior_sigma[random]
+    wide = means[:, random] * fitted.prior_sigma[random]
     plain = np.diag(noise) + wide @ wide.T
     stated = plain + loose @ loose.T
     free = means[:, ~random]
     # unknown rotations hide the residuals that they can produce
-    seen = _MeasuredMeans(gram, d, channels, used)
-    good = (found.bad <= thresholds.CERTAIN)[seen.window] | (0 not in channels)
+    measured = _MeasuredMeans(gram, d, channels, used)
+    good = (fitted.bad <= thresholds.CERTAIN)[measured.window] | (0 not in channels)
     columns = np.hstack([free, loose])[good]
     columns = columns[:, np.any(columns != 0.0, axis=0)]
     chi2, rank = _least_chi2(plain[np.ix_(good, good)], columns, y[good])
-    residual = seen.as_table(y - free @ found.mean[~random])
-    wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
-    sizes = free * found.prior_sigma[~random]
-    off, unsure = _held_out_residuals(stated + wander, sizes, y, seen)
-    alone = seen.as_table(off, unsure)
+    residual = measured.as_table(y - free @ fitted.mean[~random])
+    wander = np.diag(np.tile(fitted.scatter[list(channels)] ** 2, p)[used])
+    sizes = free * fitted.prior_sigma[~random]
+    off, unsure = _held_out_residuals(stated + wander, sizes, y, measured)
+    alone = measured.as_table(off, unsure)
     return TriadFit(
-        chi2, int(good.sum()) - rank, seen.rms(residual), seen.rms(alone), residual,
-        LargestResidual.of(alone, seen.sigma_table(unsure), seen.freely_rotated),
-    )  # fmt: skip
+        chi2,
+        int(good.sum()) - rank,
+        measured.rms(residual),
+        measured.rms(alone),
+        residual,
+        LargestResidual.of(
+            alone, measured.sigma_table(unsure), measured.freely_rotated
+        ),
+    )
 
 
 def _random_columns(d: ParameterSet) -> Mask:
@@ -146,9 +152,9 @@ def _random_columns(d: ParameterSet) -> Mask:
 
 def _free_rotations(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:
     """Columns of the rotations of positions of unknown orientation, (3 p, 2 p)."""
-    some = gram.free_rotations[:p, list(channels)]
+    rotations = gram.free_rotations[:p, list(channels)]
     out = np.zeros((p, 3, p, 2))
-    out[np.arange(p), :, np.arange(p)] = some
+    out[np.arange(p), :, np.arange(p)] = rotations
     return out.reshape(3 * p, 2 * p)
 
 
@@ -255,12 +261,12 @@ class _MeasuredMeans:
 
 
 def _held_out_residuals(
-    stated: Array, wide: Array, y: Array, seen: _MeasuredMeans
+    stated: Array, wide: Array, y: Array, measured: _MeasuredMeans
 ) -> tuple[Array, Array]:
     """Residuals of means in fits without their own window, (1), and covariances."""
     inverse = np.linalg.inv(stated + wide @ wide.T)
-    rhs, window = inverse @ y, seen.window
-    out, unsure = np.zeros(len(y)), np.zeros((len(seen.d.window_positions), 3, 3))
+    rhs, window = inverse @ y, measured.window
+    out, unsure = np.zeros(len(y)), np.zeros((len(measured.d.window_positions), 3, 3))
     for i in np.unique(window):
         own = np.flatnonzero(window == i)
         block = np.linalg.inv(inverse[np.ix_(own, own)])

@@ -19,9 +19,9 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import thresholds
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import Mixing, Mixture, covariance_of_means
-from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.solve.parameter_set import ParameterSet
 from fieldcal.solve.variants import variants
@@ -29,7 +29,7 @@ from fieldcal.solve.variants import variants
 
 def mixture_with_causes(
     parameter_set: ParameterSet,
-    search: Search,
+    sets: Sets,
     carried: Sequence[Member],
     doubt: bool = True,
 ) -> Mixture:
@@ -37,9 +37,9 @@ def mixture_with_causes(
 
     With `doubt`, each window may also be bad.
     """
-    there = search.evaluate(parameter_set.with_causes(carried))
+    fitted = sets.evaluate(parameter_set.with_causes(carried))
     return Mixing(
-        parameter_set, search.gram, there, search.typical_instability, doubt=doubt
+        parameter_set, sets.gram, fitted, sets.typical_instability, doubt=doubt
     ).run()
 
 
@@ -67,42 +67,44 @@ def average_explanations(
     averaged: bool,
 ) -> AllParameters:
     """Mean and covariance over all explanations, (1) of `explanations`."""
-    if not averaged or not any(one.members for one in parameter_set.explanations):
+    if not averaged or not any(
+        explanation.members for explanation in parameter_set.explanations
+    ):
         only = _parameters_at_end(parameter_set, likeliest, nominal)
         return AllParameters(*only, np.zeros(len(only[0])))
-    search = Search(parameter_set, gram)
+    sets = Sets(parameter_set, gram)
     doubt = bool(likeliest.bad.max(initial=0.0) > thresholds.LOOKED_AT)
     chance: dict[tuple[Member, ...], float] = {}
-    for one in parameter_set.explanations:  # explanations may share variants
-        for same in variants(search, parameter_set.base_members, one):
-            p = one.probability * same.probability
-            chance[same.members] = chance.get(same.members, 0.0) + p
-    found = []
+    for explanation in parameter_set.explanations:  # explanations may share variants
+        for variant in variants(sets, parameter_set.base_members, explanation):
+            p = explanation.probability * variant.probability
+            chance[variant.members] = chance.get(variant.members, 0.0) + p
+    estimates = []
     for members in chance:
-        there = likeliest
+        mixture = likeliest
         if parameter_set.with_causes(members) != parameter_set.members:
-            there = mixture_with_causes(parameter_set, search, members, doubt)
-        found.append(_parameters_at_end(parameter_set, there, nominal))
+            mixture = mixture_with_causes(parameter_set, sets, members, doubt)
+        estimates.append(_parameters_at_end(parameter_set, mixture, nominal))
     weight = np.array(list(chance.values()))
-    means = np.array([value for value, _ in found])
+    means = np.array([value for value, _ in estimates])
     values: Array = weight @ means
-    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, c in found]))
+    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, c in estimates]))
     covariance += covariance_of_means(means, weight)
     plain, own = _parameters_at_end(
-        parameter_set, mixture_with_causes(parameter_set, search, (), doubt), nominal
+        parameter_set, mixture_with_causes(parameter_set, sets, (), doubt), nominal
     )
     return AllParameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
 
 
 def _parameters_at_end(
-    parameter_set: ParameterSet, found: Mixture, nominal: State
+    parameter_set: ParameterSet, mixture: Mixture, nominal: State
 ) -> tuple[Array, Array]:
     """Parameters of one explanation at the end of the recording, (2)."""
     picked, before = (
-        parameter_matrix(parameter_set, found.columns),
+        parameter_matrix(parameter_set, mixture.columns),
         _nominal_values(parameter_set, nominal),
     )
-    return before + picked @ found.mean, picked @ found.covariance @ picked.T
+    return before + picked @ mixture.mean, picked @ mixture.covariance @ picked.T
 
 
 def parameter_matrix(parameter_set: ParameterSet, columns: Index) -> Array:

@@ -35,12 +35,12 @@ from fieldcal.solve.estimation import (
 )
 from fieldcal.solve.latitude import VerticalEarthRate
 from fieldcal.solve.lot_contribution import combine_with_lot
+from fieldcal.solve.observation_rows import rows_of_observations, without_angles
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.parameter_set import ParameterSetOptions
 from fieldcal.solve.rank import ladder_remedy
 from fieldcal.solve.result import build_calibration
-from fieldcal.solve.rows import rows_of_means, without_angles
 
 EarthRateModel = Literal["stated", "another", "none"]
 """Earth's rate in the gyroscopes: of the stated latitude, of another one, or none."""
@@ -130,13 +130,17 @@ def _solve_with_lot(
 ) -> Calibration:
     """The calibration of the session alone, or with its lot if the unit fits to it."""
     alone = replace(options, lot=None)
-    found, notes = _fit_over_earth_rates(observations, alone, method, recorded)
-    told = None
+    estimate, notes = _fit_over_earth_rates(observations, alone, method, recorded)
+    contribution = None
     if options.lot is not None:
-        beside, others = _fit_over_earth_rates(observations, options, method, recorded)
-        found, told = combine_with_lot(found, beside, options.lot)
-        notes = notes if told is None or told.refused else others
-    return build_calibration(method, observations, options, found, notes, told)
+        with_lot, lot_notes = _fit_over_earth_rates(
+            observations, options, method, recorded
+        )
+        estimate, contribution = combine_with_lot(estimate, with_lot, options.lot)
+        notes = notes if contribution is None or contribution.refused else lot_notes
+    return build_calibration(
+        method, observations, options, estimate, notes, contribution
+    )
 
 
 def _fit_over_earth_rates(
@@ -154,22 +158,22 @@ def _fit_over_earth_rates(
     def fitted(earth: EarthRateModel) -> tuple[ParameterEstimate, list[str]]:
         return _SessionFit(observations, options, method, recorded, earth).best_fit()
 
-    found, notes = fitted("stated")
+    estimate, notes = fitted("stated")
     shown = VerticalEarthRate.of(
-        found.parameter_set, found.search, observations.latitude
+        estimate.parameter_set, estimate.sets, observations.latitude
     )
     if shown is None or not shown.other_favoured:
-        return found, notes
+        return estimate, notes
     other, (none, others) = fitted("another")[0], fitted("none")
-    ahead = none.score - found.score + np.log(priors.WRONG_LATITUDE_CHANCE)
+    ahead = none.score - estimate.score + np.log(priors.WRONG_LATITUDE_CHANCE)
     score = np.array([0.0, shown.gain, ahead])
     weights = np.exp(score - score.max())
     as_said, elsewhere, absent = (weights / weights.sum()).tolist()
     if ahead > max(0.0, shown.gain):
-        mixed = none.with_model_uncertainty(none, found, as_said)
+        mixed = none.with_model_uncertainty(none, estimate, as_said)
         return mixed.with_model_uncertainty(none, other, elsewhere), [NO_EARTH, *others]
-    mixed = found.with_model_uncertainty(found, other, elsewhere)
-    return mixed.with_model_uncertainty(found, none, absent), notes
+    mixed = estimate.with_model_uncertainty(estimate, other, elsewhere)
+    return mixed.with_model_uncertainty(estimate, none, absent), notes
 
 
 class _SessionFit:
@@ -202,7 +206,7 @@ class _SessionFit:
             self.earth_sigma = (self.earth_sigma[0], EARTH_RATE, self.earth_sigma[2])
         elif earth == "none":
             base, self.earth_sigma = np.zeros(3), (0.0, 0.0, 0.0)
-        recorded_rows = recorded or rows_of_means(observations)
+        recorded_rows = recorded or rows_of_observations(observations)
         rows = recorded_rows.rows
         if method == "scalar":
             rows = without_angles(rows, observations.nominal)
@@ -260,23 +264,23 @@ class _SessionFit:
             turned=turned,
             lot=self.options.lot,
         )
-        found = estimate_parameters(
+        estimate = estimate_parameters(
             self.recorded, turning, self.nominal, wanted, follow
         )
         if (stated := self.options.at_best) is None:
-            return found
-        chances = found.coarser_probabilities(stated)
+            return estimate
+        chances = estimate.coarser_probabilities(stated)
         finer = {
             k: getattr(stated, k)
             for k, p in chances.items()
             if p < COARSER_GRADE_CHANCE
         }
         if not finer:
-            return found
+            return estimate
         wanted = replace(wanted, factory=replace(wanted.factory, **finer))
         best = estimate_parameters(self.recorded, turning, self.nominal, wanted, follow)
         as_stated = np.prod([1 - chances[k] for k in finer])
-        return best.with_model_uncertainty(best, found, 1 - float(as_stated))
+        return best.with_model_uncertainty(best, estimate, 1 - float(as_stated))
 
     def _fit_best_tilt(self) -> tuple[ParameterEstimate, list[str]]:
         """Fit with the better model of the tilt; the covariance includes the other one.
@@ -305,8 +309,10 @@ class _SessionFit:
                 " both; more positions with both angles turned would tell"
             )
         weight = 1 / (1 + float(np.exp(min(ahead, 50.0))))
-        found = self._fit_all_rows(best, usable)
-        return found.with_model_uncertainty(usable[best], usable[other], weight), [note]
+        estimate = self._fit_all_rows(best, usable)
+        return estimate.with_model_uncertainty(usable[best], usable[other], weight), [
+            note
+        ]
 
     def _fit_all_rows(
         self, tilt: Tilt, by_windows: dict[Tilt, ParameterEstimate]
@@ -324,9 +330,9 @@ class _SessionFit:
         )
 
 
-def _determines_all(found: ParameterEstimate) -> bool:
+def _determines_all(estimate: ParameterEstimate) -> bool:
     """Whether all parameters of the accelerometers and the tilt are determined."""
-    if not found.acc.dof and not found.acc.chi2 and not found.names:
+    if not estimate.acc.dof and not estimate.acc.chi2 and not estimate.names:
         return False
-    open_ = {group_of(n) for n in found.undetermined}
+    open_ = {group_of(n) for n in estimate.undetermined}
     return not open_ & {"acc_bias", "acc_scale", *TILTS}

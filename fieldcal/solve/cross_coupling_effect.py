@@ -95,12 +95,12 @@ def _added_sigma(estimate: ParameterEstimate, group: Group) -> Array:
 
     Returns (k,), 1 sigma, in units of the parameter.
     """
-    there = estimate.search.evaluate(estimate.parameter_set.members).state
-    inner, _ = there.schur_complement(group.columns, group.typical)
+    state = estimate.sets.evaluate(estimate.parameter_set.members).state
+    inner, _ = state.schur_complement(group.columns, group.typical)
     unknown = np.linalg.inv(np.eye(len(inner)) + inner)  # C / T^2
-    rows = there.rows.matrix(there.columns, group.columns)
+    rows = state.rows.matrix(state.columns, group.columns)
     moved = (
-        parameter_matrix(estimate.parameter_set, there.columns) @ there.inverse @ rows
+        parameter_matrix(estimate.parameter_set, state.columns) @ state.inverse @ rows
     )  # D
     var = np.einsum("ki,ij,kj->k", moved, unknown, moved)
     out: Array = np.sqrt(np.maximum(var, 0.0))

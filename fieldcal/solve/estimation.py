@@ -16,10 +16,10 @@ from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.known_rows import KnownRows
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.two_grades import chances_of_coarser
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
-from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import TurnTracker
@@ -66,8 +66,8 @@ class RecordedRows:
         """Return the integrator of the turns; None if there are no turns."""
         if self.source is None:
             return None
-        found = TurnTracker(self.source, self.rows, self.since_turn)
-        return found if found.legs else None
+        tracker = TurnTracker(self.source, self.rows, self.since_turn)
+        return tracker if tracker.legs else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class ParameterEstimate:
     score : log evidence of the set from all windows, before any is left out. Only this
         value can be compared between sets
     shift_sigmas : (k,) by how many sigmas the unrequested effects move each parameter
-    search : weighs sets of causes by the same rows
+    sets : weighs sets of causes by the same rows
     acc, gyr : how well the windows of each triad agree
     turn_rows : rows of the turns
     contradicted_turns : pairs of used windows between which the rotation measured by
@@ -103,7 +103,7 @@ class ParameterEstimate:
     mixture: Mixture
     score: float
     shift_sigmas: Array
-    search: Search
+    sets: Sets
     acc: TriadFit
     gyr: TriadFit
     turn_rows: tuple[TurnRows, ...]
@@ -147,7 +147,7 @@ class ParameterEstimate:
 
     def coarser_probabilities(self, stated: FactoryErrors) -> dict[str, float]:
         """Probability that each kind of error is as in the set, and not as stated."""
-        state = self.search.evaluate(self.parameter_set.members).state
+        state = self.sets.evaluate(self.parameter_set.members).state
         left = [
             group
             for _, group in self.parameter_set.base_members
@@ -161,19 +161,19 @@ class ParameterEstimate:
     def causes(self) -> dict[str, float]:
         """Unrequested causes in the set, with their probabilities."""
         out: dict[str, float] = {}
-        for one in self.parameter_set.explanations:
-            told = (cause.name for cause, _ in one.members if cause.reportable)
-            for name in dict.fromkeys(told):
-                out[name] = out.get(name, 0.0) + one.probability
+        for explanation in self.parameter_set.explanations:
+            names = (cause.name for cause, _ in explanation.members if cause.reportable)
+            for name in dict.fromkeys(names):
+                out[name] = out.get(name, 0.0) + explanation.probability
         return dict(sorted(out.items(), key=lambda item: -item[1]))
 
     @property
     def any_cause_probability(self) -> float:
         """Probability that at least one unrequested cause is present."""
         return sum(
-            one.probability
-            for one in self.parameter_set.explanations
-            if any(cause.reportable for cause, _ in one.members)
+            explanation.probability
+            for explanation in self.parameter_set.explanations
+            if any(cause.reportable for cause, _ in explanation.members)
         )
 
     @property
@@ -240,26 +240,26 @@ def estimate_parameters(
     parameter_set.known = _known_rows(parameter_set, recorded, nominal)
     turns = None if turning is None else Turns(turning, parameter_set, False)
     fit = settle_without_bad_windows(recorded.rows, parameter_set, nominal, turns)
-    found, gram = fit.mixture, fit.gram
-    parameters = average_explanations(parameter_set, gram, found, nominal, averaged)
-    picked = parameter_matrix(parameter_set, found.columns)
+    mixture, gram = fit.mixture, fit.gram
+    parameters = average_explanations(parameter_set, gram, mixture, nominal, averaged)
+    picked = parameter_matrix(parameter_set, mixture.columns)
     names, values, covariance, moved, missing = select_determined(
         parameter_set, parameters
     )
     at = [parameter_set.names.index(name) for name in names]
     elsewhere = turning.contradicted_turns if turning else ()
     counts = set(
-        parameter_set.window_positions[found.bad <= thresholds.CERTAIN].tolist()
+        parameter_set.window_positions[mixture.bad <= thresholds.CERTAIN].tolist()
     )
     return ParameterEstimate(
-        parameter_set, parameters, names, values, covariance, missing, found,
+        parameter_set, parameters, names, values, covariance, missing, mixture,
         fit.score, moved,
-        Search(parameter_set, gram),
-        triad_agreement(gram, parameter_set, found, (0, 1, 2)),
-        triad_agreement(gram, parameter_set, found, (3, 4, 5)),
+        Sets(parameter_set, gram),
+        triad_agreement(gram, parameter_set, mixture, (0, 1, 2)),
+        triad_agreement(gram, parameter_set, mixture, (3, 4, 5)),
         fit.turn_rows,
         tuple(pair for pair in elsewhere if counts.issuperset(pair)),
-        tuple(wrong_angles(parameter_set, found, names, picked[at])),
+        tuple(wrong_angles(parameter_set, mixture, names, picked[at])),
     )  # fmt: skip
 
 
@@ -270,17 +270,17 @@ def _known_rows(
     lot, rows = parameter_set.options.lot, []
     if lot is not None and (known := lot_rows(parameter_set, lot, nominal)) is not None:
         rows.append(known)
-    group, seen = parameter_set.filters, recorded.filters
-    if group is not None and seen is not None and len(seen[1]):
-        rows.append(KnownRows(group.columns, *seen))
+    group, measured = parameter_set.filters, recorded.filters
+    if group is not None and measured is not None and len(measured[1]):
+        rows.append(KnownRows(group.columns, *measured))
     return KnownRows.concatenated(rows) if rows else None
 
 
-def window_scatter(found: Mixture, channels: tuple[int, ...]) -> float:
+def window_scatter(mixture: Mixture, channels: tuple[int, ...]) -> float:
     """Rms scatter of the windows of a triad beyond their noise, in outputs."""
-    return float(np.sqrt(np.mean(found.scatter[list(channels)] ** 2)))
+    return float(np.sqrt(np.mean(mixture.scatter[list(channels)] ** 2)))
 
 
-def closure_scatter(found: Mixture) -> float:
+def closure_scatter(mixture: Mixture) -> float:
     """Rms scatter of the closures of turns beyond their noise, rad."""
-    return float(found.scatter[CLOSURE])
+    return float(mixture.scatter[CLOSURE])

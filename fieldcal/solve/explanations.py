@@ -77,10 +77,10 @@ class WeightedExplanation:
     sizes: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, one: Set, probability: float) -> WeightedExplanation:
+    def of(cls, fitted: Set, probability: float) -> WeightedExplanation:
         """From a set of a search, with the sizes that it has for its causes."""
-        sizes = priors.SIZES[list(one.sizes.members)].tolist()
-        return cls(one.members, probability, sizes=tuple(sizes))
+        sizes = priors.SIZES[list(fitted.sizes.members)].tolist()
+        return cls(fitted.members, probability, sizes=tuple(sizes))
 
     @property
     def sizes_by_key(self) -> dict[str, float]:
@@ -104,20 +104,26 @@ def translate_explanations(
     total: dict[frozenset[Group], float] = {}
     own: dict[Group, Cause] = {}
     unseen = _unseen_tilts(shown, has)
-    for one in shown:
+    for explanation in shown:
         # one tilt stands for the other, where there are not both
-        both = bool(has & unseen) and unseen <= {cause.name for cause, _ in one.members}
-        kept = [m for m in one.members if _is_missing(m, has if both else has | unseen)]
+        both_tilts = bool(has & unseen) and unseen <= {
+            cause.name for cause, _ in explanation.members
+        }
+        kept = [
+            m
+            for m in explanation.members
+            if _is_missing(m, has if both_tilts else has | unseen)
+        ]
         own |= {group: cause for cause, group in kept}
         key = frozenset(group for _, group in kept)
-        total[key] = total.get(key, 0.0) + one.probability
+        total[key] = total.get(key, 0.0) + explanation.probability
     least = thresholds.LOOKED_AT * sum(total.values())
     likely = {k: p for k, p in total.items() if p >= least}
     # in their original order: the order of a Python set differs from run to run
     wanted = {g: c for g, c in own.items() if any(g in key for key in likely)}
     size: dict[str, float] = {}
-    for one in sorted(shown, key=lambda s: s.probability):
-        size |= one.sizes_by_key
+    for explanation in sorted(shown, key=lambda s: s.probability):
+        size |= explanation.sizes_by_key
     here = {g: m for g, m in _in_other_dictionary(d, wanted, size)}
     also = list(_on_other_triad(d, [c for c, _ in here.values()]))
     out: dict[frozenset[Group], WeightedExplanation] = {}
@@ -141,8 +147,8 @@ def _unseen_tilts(shown: Sequence[WeightedExplanation], has: set[str]) -> set[st
     if has & set(TILTS):
         return set(TILTS)
     share = {
-        name: sum(one.probability for one in shown
-                  if any(cause.name == name for cause, _ in one.members))
+        name: sum(explanation.probability for explanation in shown
+                  if any(cause.name == name for cause, _ in explanation.members))
         for name in TILTS
     }  # fmt: skip
     return {name for name, p in share.items() if p < thresholds.NAMED}
@@ -185,13 +191,15 @@ def _in_other_dictionary(
             yield group, (same, same.variants[cause.variants.index(group)])
     for cause in {c.key: c for c in wanted.values()}.values():
         pairs = new.get(cause.key, [])
-        variants = tuple(one for _, some in pairs for one in some)
+        variants = tuple(
+            variant for _, own_variants in pairs for variant in own_variants
+        )
         instants = [(at, at) for g in cause.expected for at in g.shape.values()]
         sized = replace(cause, variants=variants).with_size(size.get(cause.key))
         same = sized.expecting_within(instants)
-        for group, some in pairs:
+        for group, own_variants in pairs:
             off = (g for g in same.expected if g.shape == group.shape)
-            own = same.variants[variants.index(some[0])]
+            own = same.variants[variants.index(own_variants[0])]
             yield group, (same, next(off, own) if group in cause.expected else own)
 
 
@@ -202,15 +210,17 @@ def _group_variants(d: Dictionary, group: Group) -> list[Group]:
         raise TypeError(f"{group.cause} has no equation")
     whole = next(at for part, at in parameter_groups(d, effect) if part == group.part)
     if isinstance(effect, Motion) or len(whole) > MAX_SUBSET_PARAMETERS:
-        one = replace(group, params=_in_axes_of(d, group))
-        return groups_at_points(d, one, [(group.shape, group.origin)])
+        whole_group = replace(group, params=_in_axes_of(d, group))
+        return groups_at_points(d, whole_group, [(group.shape, group.origin)])
     own = (group.shape, group.origin)
     grid = [own, *(point for point in shape_points(d, effect) if point != own)]
     out = [
-        one if len(some) == len(whole) else _with_parameters(one, some)
-        for one in groups_at_points(d, replace(group, params=whole), grid)
+        whole_group
+        if len(params) == len(whole)
+        else _with_parameters(whole_group, params)
+        for whole_group in groups_at_points(d, replace(group, params=whole), grid)
         for n in range(1, len(whole) + 1)
-        for some in combinations(whole, n)
+        for params in combinations(whole, n)
     ]
     return sorted(out, key=lambda g: (g.params, g.shape) != (group.params, group.shape))
 
@@ -238,10 +248,10 @@ def _on_other_triad(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
         group = first.variants[0]
         if not isinstance(group.effect, Sensor):
             continue
-        for part, some in parameter_groups(d, group.effect):
+        for part, params in parameter_groups(d, group.effect):
             other = replace(first, part=part)
-            if part != first.part and some and other.key not in known:
-                every = _group_variants(d, replace(group, part=part, params=some))
+            if part != first.part and params and other.key not in known:
+                every = _group_variants(d, replace(group, part=part, params=params))
                 yield replace(other, variants=tuple(every)), every[0]
 
 
@@ -265,25 +275,25 @@ def bias_scale_at_end(d: Dictionary, shown: Sequence[WeightedExplanation]) -> Ar
     not belong to the explanations have 0.
     """
     out = np.zeros((2, 6, d.width))
-    there = np.zeros(d.width, dtype=bool)
-    for one in shown:
-        for cause, group in (*one.members, *one.possible_members):
+    changing = np.zeros(d.width, dtype=bool)
+    for explanation in shown:
+        for cause, group in (*explanation.members, *explanation.possible_members):
             if not isinstance(group.effect, Motion) and (
                 group.effect is not None or cause.name in CHANGING
             ):
                 for each in cause.variants if has_equation(group) else (group,):
-                    there[each.columns] = True
-    if not there.any():
+                    changing[each.columns] = True
+    if not changing.any():
         return out
-    out[0] = _end_outputs(d, there, np.zeros(6))
+    out[0] = _end_outputs(d, changing, np.zeros(6))
     for c in range(6):
         step = DERIVATIVE_STEP * np.eye(6)[c]
-        up, down = (_end_outputs(d, there, s * step)[c] for s in (1.0, -1.0))
+        up, down = (_end_outputs(d, changing, s * step)[c] for s in (1.0, -1.0))
         out[1, c] = (up - down) / (2 * DERIVATIVE_STEP)
     return out
 
 
-def _end_outputs(d: Dictionary, there: Array, felt: Array) -> Array:
+def _end_outputs(d: Dictionary, changing: Array, felt: Array) -> Array:
     """Outputs by column, (6, k), at the end of the recording for inputs f, w, (6,).
 
     The last turn is taken as long ago, so that motion of the joints is excluded.
@@ -302,10 +312,10 @@ def _end_outputs(d: Dictionary, there: Array, felt: Array) -> Array:
     view = RowView(x, x, np.full((len(d.since), 1), np.inf), nowhere)
     out = np.zeros((6, d.width))
     for first, end, basis in d.basis_ranges():
-        if not there[first:end].any():
+        if not changing[first:end].any():
             continue
         row = basis.evaluate(view)[0]
         out[:, first:end] = (
             np.kron(np.eye(6), row) if isinstance(basis, Course) else row
         )
-    return np.where(there, out, 0.0)
+    return np.where(changing, out, 0.0)

@@ -121,9 +121,9 @@ def expansion(observations: Observations) -> tuple[Array, Array, Array]:
     """Functions of the angles for the expansion of each axis, (n, 3 or 5) each."""
     a, b = observations.angles
     sa, ca, sb, cb = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
-    one = np.ones_like(a)
-    x = np.stack([one, sa, ca], axis=1)  # (17)
-    yz = np.stack([one, ca * cb, ca * sb, sa * cb, sa * sb], axis=1)  # (24)
+    ones = np.ones_like(a)
+    x = np.stack([ones, sa, ca], axis=1)  # (17)
+    yz = np.stack([ones, ca * cb, ca * sb, sa * cb, sa * sb], axis=1)  # (24)
     return x, yz, yz
 
 
@@ -133,9 +133,9 @@ def _parameters_with_derivatives(
     """Parameters from all coefficients, and their derivatives by them."""
     stepped = np.vstack([c + 0j, c + 1j * IMAGINARY_STEP * np.eye(len(c))]).T
     x, y, z = (stepped[i:j] for i, j in pairwise(limits))
-    found = _parameters_of_axes(x, y, z, g, as_printed)
-    table = np.stack(list(found.values()))
-    return tuple(found), table[:, 0].real, table[:, 1:].imag / IMAGINARY_STEP
+    parameters = _parameters_of_axes(x, y, z, g, as_printed)
+    table = np.stack(list(parameters.values()))
+    return tuple(parameters), table[:, 0].real, table[:, 1:].imag / IMAGINARY_STEP
 
 
 def _parameters_of_axes(

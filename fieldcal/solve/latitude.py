@@ -20,7 +20,7 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.search.selection import Search
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.solve.parameter_set import ParameterSet
 
 VERTICAL = 1
@@ -46,14 +46,14 @@ class VerticalEarthRate:
 
     @classmethod
     def of(
-        cls, parameter_set: ParameterSet, search: Search, latitude: float | None
+        cls, parameter_set: ParameterSet, sets: Sets, latitude: float | None
     ) -> VerticalEarthRate | None:
         """Measure by the rows of a set, (1); None if the set has no such column.
 
         Parameters
         ----------
         parameter_set : the set
-        search : of its rows
+        sets : of its rows
         latitude : stated latitude, rad; None if none is stated
 
         """
@@ -66,8 +66,8 @@ class VerticalEarthRate:
         other = Cause(
             group.cause, group.part, priors.WRONG_LATITUDE_CHANCE, (group,), "given"
         )
-        as_said = search.evaluate(parameter_set.members)
-        free = search.evaluate((*parameter_set.members, (other, group)))
+        as_said = sets.evaluate(parameter_set.members)
+        free = sets.evaluate((*parameter_set.members, (other, group)))
         at = free.state.columns == column[0]
         stated = EARTH_RATE * float(np.sin(latitude))
         return cls(

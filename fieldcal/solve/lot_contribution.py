@@ -140,7 +140,7 @@ def _unit(name: str) -> str:
 
 
 def combine_with_lot(
-    own: ParameterEstimate, found: ParameterEstimate, lot: LotPrior
+    own: ParameterEstimate, with_lot: ParameterEstimate, lot: LotPrior
 ) -> tuple[ParameterEstimate, LotContribution | None]:
     """The estimate with the lot, or without it if the unit is an outlier.
 
@@ -148,34 +148,36 @@ def combine_with_lot(
 
     Parameters
     ----------
-    own, found : estimates without the lot and with it
+    own, with_lot : estimates without the lot and with it
     lot : prior from the lot
 
     """
-    lot = lot.subset([n for n in found.names if n in own.parameter_set.names])
+    lot = lot.subset([n for n in with_lot.names if n in own.parameter_set.names])
     if not lot.names:
         return own, None
     others = _OutlierHypotheses.of(own, lot)
     kept = (
         own
         if others.outlier_probability > thresholds.NAMED
-        else others.mixture_with(found)
+        else others.mixture_with(with_lot)
     )
     lot = lot.subset(kept.names)
-    told = LotContribution(
+    contribution = LotContribution(
         lot,
         others.outlier_probability,
         others.outlier_parameter,
         _estimates(own),
         _estimates(kept),
     )
-    return kept, told
+    return kept, contribution
 
 
-def _estimates(one: ParameterEstimate) -> dict[str, tuple[float, float]]:
+def _estimates(estimate: ParameterEstimate) -> dict[str, tuple[float, float]]:
     """Value and sigma of each parameter by its full name."""
-    rows = zip(one.values.tolist(), np.sqrt(np.diag(one.covariance)), strict=True)
-    return {n: (v, float(s)) for n, (v, s) in zip(one.names, rows, strict=True)}
+    rows = zip(
+        estimate.values.tolist(), np.sqrt(np.diag(estimate.covariance)), strict=True
+    )
+    return {n: (v, float(s)) for n, (v, s) in zip(estimate.names, rows, strict=True)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,20 +205,20 @@ class _OutlierHypotheses:
         names, every = own.parameter_set.names, own.all_parameters
         at = np.array([names.index(name) for name in lot.names])
         scale = np.sqrt(np.diag(every.covariance))
-        told = np.linalg.inv(every.covariance / scale / scale[:, None])
+        information = np.linalg.inv(every.covariance / scale / scale[:, None])
         middle = np.zeros(len(names))
         middle[at] = lot.mean / scale[at]
-        rhs = told @ (every.values / scale - middle)
+        rhs = information @ (every.values / scale - middle)
         wide = lot.covariance / scale[at] / scale[at][:, None]
         odd, chances, spreads = zip(*_hypothesis_priors(lot, wide), strict=True)
         covariances, score = [], np.log(chances)
-        for i, one in enumerate(spreads):
-            there = told.copy()
-            there[np.ix_(at, at)] += np.linalg.inv(one)
-            covariances.append(np.linalg.inv(there))
+        for i, spread in enumerate(spreads):
+            information_with_lot = information.copy()
+            information_with_lot[np.ix_(at, at)] += np.linalg.inv(spread)
+            covariances.append(np.linalg.inv(information_with_lot))
             score[i] += 0.5 * float(rhs @ covariances[i] @ rhs)  # (2)
-            score[i] -= 0.5 * float(np.linalg.slogdet(there)[1])
-            score[i] -= 0.5 * float(np.linalg.slogdet(one)[1])
+            score[i] -= 0.5 * float(np.linalg.slogdet(information_with_lot)[1])
+            score[i] -= 0.5 * float(np.linalg.slogdet(spread)[1])
         made = np.array(covariances)
         return cls(
             names, odd, np.exp(score - np.logaddexp.reduce(score)),
@@ -234,19 +236,19 @@ class _OutlierHypotheses:
         """Most likely parameter of an outlier; empty for all."""
         return self.parameters[1 + int(np.argmax(self.probabilities[1:]))]
 
-    def mixture_with(self, found: ParameterEstimate) -> ParameterEstimate:
+    def mixture_with(self, estimate: ParameterEstimate) -> ParameterEstimate:
         """Mixture of the estimate with the lot and those of the outlier hypotheses."""
-        ours = [i for i, name in enumerate(found.names) if name in self.names]
-        at = [self.names.index(found.names[i]) for i in ours]
-        means = np.tile(found.values, (len(self.probabilities), 1))
-        covariances = np.tile(found.covariance, (len(self.probabilities), 1, 1))
+        ours = [i for i, name in enumerate(estimate.names) if name in self.names]
+        at = [self.names.index(estimate.names[i]) for i in ours]
+        means = np.tile(estimate.values, (len(self.probabilities), 1))
+        covariances = np.tile(estimate.covariance, (len(self.probabilities), 1, 1))
         means[1:, ours] = self.means[1:, at]
         both = np.ix_(range(1, len(self.probabilities)), ours, ours)
         covariances[both] = self.covariances[1:][:, at][:, :, at]
         mean = self.probabilities @ means
         covariance = np.einsum("h,hij->ij", self.probabilities, covariances)
         covariance += covariance_of_means(means, self.probabilities)
-        return replace(found, values=mean, covariance=covariance)
+        return replace(estimate, values=mean, covariance=covariance)
 
 
 def _hypothesis_priors(
@@ -256,12 +258,12 @@ def _hypothesis_priors(
     yield ALL_PARAMETERS, 1.0, wide
     more = lot.outlier_factor**2 - 1
     for j, name in enumerate(lot.names):
-        one = wide.copy()
-        one[j, j] += more * wide[j, j]
+        spread = wide.copy()
+        spread[j, j] += more * wide[j, j]
         yield (
             name,
             float(lot.outlier_probability[j] / (1 - lot.outlier_probability[j])),
-            one,
+            spread,
         )
     odd = float(lot.outlier_probability.mean())
     yield ALL_PARAMETERS, odd / (1 - odd), (1 + more) * wide

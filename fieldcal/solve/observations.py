@@ -158,8 +158,8 @@ class Observations:
     @property
     def forces(self) -> Array:
         """Specific force at rest in device axes, (n, 3) m/s^2."""
-        seen: Array = specific_forces(self.positions, self.gravity) @ self.mounting
-        return seen
+        forces: Array = specific_forces(self.positions, self.gravity) @ self.mounting
+        return forces
 
     @property
     def known_latitude(self) -> float:
@@ -181,8 +181,8 @@ class Observations:
     @property
     def rates(self) -> Array:
         """Known rates of a rate table in device axes, (n, 3) rad/s; 0 at rest."""
-        seen: Array = table_rates(self.positions) @ self.mounting
-        return seen
+        rates: Array = table_rates(self.positions) @ self.mounting
+        return rates
 
     def _check_shapes(self, n: int) -> None:
         shapes = {
@@ -193,9 +193,9 @@ class Observations:
             "mounting": (3, 3),
         }
         for name, shape in shapes.items():
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise InputError(f"{name} is {found} where {n} positions need {shape}")
+            actual = np.shape(getattr(self, name))
+            if actual != shape:
+                raise InputError(f"{name} is {actual} where {n} positions need {shape}")
         if n == 0:
             raise InputError("there is no position: mark at least two")
 

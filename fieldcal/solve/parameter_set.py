@@ -117,7 +117,7 @@ class ParameterSet(Dictionary):
         )
         left = self._warm_scales(self.base_members)
         self.causes = [*self.causes, *(cause for cause, _ in left.values())]
-        every = [m for one in self.explanations for m in one.members]
+        every = [m for explanation in self.explanations for m in explanation.members]
         self._warm = self._warm_scales(every)
         self.omitted_cross_coupling = self._usual_cross_coupling()
 
@@ -182,8 +182,8 @@ class ParameterSet(Dictionary):
         if w.cross:
             yield self._effect_cause("cross_coupling", turned=not oriented)
         left = replace(w.factory, **({"cross_coupling": 0.0} if w.cross else {}))
-        for one in factory_groups(self, left, turned=not oriented):
-            yield _given_cause(one)
+        for group in factory_groups(self, left, turned=not oriented):
+            yield _given_cause(group)
         if w.gyro_cross:
             yield self._effect_cause(
                 "gyro_cross_coupling", free=priors.GYRO_COUPLING_SIZE
@@ -200,13 +200,13 @@ class ParameterSet(Dictionary):
 
     def _warm_scales(self, members: Iterable[Member]) -> dict[str, Member]:
         """Changes of scale factors that accompany changes of biases, by cause key."""
-        found = {cause.key: warm_scale(self, group) for cause, group in members}
-        return {key: scale for key, scale in found.items() if scale is not None}
+        warm = {cause.key: warm_scale(self, group) for cause, group in members}
+        return {key: scale for key, scale in warm.items() if scale is not None}
 
     def _usual_cross_coupling(self) -> Group | None:
         """Cross-coupling of usual size if it is not in the set; else None."""
-        there = {c.name for c, _ in self.members}
-        if "cross_coupling" in there or not self.x.f.any():
+        names = {c.name for c, _ in self.members}
+        if "cross_coupling" in names or not self.x.f.any():
             return None
         oriented = bool(self.x.oriented.any())
         return self._effect_cause("cross_coupling", turned=not oriented).variants[0]
@@ -223,11 +223,11 @@ class ParameterSet(Dictionary):
         If the device is `turned` by an unknown rotation, the parameters that such a
         rotation can produce from others are left out.
         """
-        one = effect_group(self, name, turned)
+        group = effect_group(self, name, turned)
         if known is None:
-            return _given_cause(replace(one, fixed_size=free))
-        size = np.full(len(one.params), known)
-        return _given_cause(replace(one, typical=size, fixed_size=1.0))
+            return _given_cause(replace(group, fixed_size=free))
+        size = np.full(len(group.params), known)
+        return _given_cause(replace(group, typical=size, fixed_size=1.0))
 
     def _earth_rate_cause(self, size: Array) -> Cause:
         """Uncertainty of the Earth's rate."""
@@ -286,11 +286,11 @@ class ParameterSet(Dictionary):
             first = self.scale if parameter.is_scale else self.bias
             at = first + parameter.channel
             return np.array([at] if at in every else [], dtype=np.intp)
-        for cause, one in self.base_members:
-            if cause.name == parameter.group and isinstance(one.effect, Effect):
-                names = [one.effect.params[j].name for j in one.params]
+        for cause, group in self.base_members:
+            if cause.name == parameter.group and isinstance(group.effect, Effect):
+                names = [group.effect.params[j].name for j in group.params]
                 if parameter.component in names:
-                    return one.columns[[names.index(parameter.component)]]
+                    return group.columns[[names.index(parameter.component)]]
         return np.empty(0, dtype=np.intp)
 
     @cached_property
@@ -310,10 +310,10 @@ class ParameterSet(Dictionary):
 
     def _effect_names(self, name: str) -> list[str]:
         return [
-            f"{name}.{one.effect.params[j].name}"
-            for cause, one in self.base_members
-            if cause.name == name and isinstance(one.effect, Effect)
-            for j in one.params
+            f"{name}.{group.effect.params[j].name}"
+            for cause, group in self.base_members
+            if cause.name == name and isinstance(group.effect, Effect)
+            for j in group.params
         ]
 
 

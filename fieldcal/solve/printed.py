@@ -64,8 +64,8 @@ def solve(observations: Observations, options: SolveOptions) -> Calibration:
     covariance = np.zeros((len(names), len(names)))
     first = 0
     for part in parts:
-        there = slice(first, first := first + len(part.names))
-        covariance[there, there] = part.covariance
+        place = slice(first, first := first + len(part.names))
+        covariance[place, place] = part.covariance
     return Calibration(
         method="least_squares" if method == "auto" else method,
         names=names,

@@ -77,11 +77,11 @@ def positions_to_add(
     while have[0] < everything:
         if len(extra) == MAX_POSITIONS:
             return []
-        found = [count([*taken, *extra, c]) for c in candidates]
-        best = max(range(len(found)), key=found.__getitem__)
-        if found[best] <= have:
+        ranks = [count([*taken, *extra, c]) for c in candidates]
+        best = max(range(len(ranks)), key=ranks.__getitem__)
+        if ranks[best] <= have:
             return []
-        have, extra = found[best], [*extra, candidates[best]]
+        have, extra = ranks[best], [*extra, candidates[best]]
     return extra
 
 

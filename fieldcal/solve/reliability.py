@@ -92,13 +92,13 @@ class WrongAngles:
 
 
 def wrong_angles(
-    parameter_set: ParameterSet, found: Mixture, names: tuple[str, ...], picked: Array
+    parameter_set: ParameterSet, mixture: Mixture, names: tuple[str, ...], picked: Array
 ) -> list[WrongAngles]:
     """Effects of all possible mistakes of angles on an estimate.
 
     Parameters
     ----------
-    parameter_set, found : the set and its posterior
+    parameter_set, mixture : the set and its posterior
     names : (k,) parameters
     picked : (k, c) derivative of the parameters by the columns of the estimate
 
@@ -110,12 +110,12 @@ def wrong_angles(
     ]
     if not own:
         return []
-    order = np.argsort(found.columns)
-    at = order[np.searchsorted(found.columns, own[0].columns, sorter=order)]
-    weight = 1 / found.prior_sigma[at] ** 2
-    told = found.covariance[np.ix_(at, at)]
-    shown = np.diag(weight) - weight[:, None] * told * weight
-    moved = -picked @ found.covariance[:, at] * weight
+    order = np.argsort(mixture.columns)
+    at = order[np.searchsorted(mixture.columns, own[0].columns, sorter=order)]
+    weight = 1 / mixture.prior_sigma[at] ** 2
+    covariance = mixture.covariance[np.ix_(at, at)]
+    shown = np.diag(weight) - weight[:, None] * covariance * weight
+    moved = -picked @ mixture.covariance[:, at] * weight
     places: Index = (own[0].columns[::2] - parameter_set.small_rotation) // 2
     out = []
     for joint, angle, position, u in _mistakes(parameter_set, places):

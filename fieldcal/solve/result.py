@@ -115,7 +115,7 @@ def _wrong_latitude(
 ) -> list[str]:
     """Sentence if the gyroscopes contradict the stated latitude."""
     shown = VerticalEarthRate.of(
-        estimate.parameter_set, estimate.search, observations.latitude
+        estimate.parameter_set, estimate.sets, observations.latitude
     )
     return [shown.sentence] if shown and shown.latitude_wrong else []
 

@@ -1,7 +1,8 @@
 """Fits a parameter set to rows: linearised until it converges, without bad windows.
 
-The state is moved to the estimate of the set (`model.inference`), turns between windows
-are integrated with this state, and the most probable explanation is taken (`mixture`).
+The state is moved to the estimate of the set (`model.search.gauss_newton`), turns
+between windows are integrated with this state, and the most probable explanation is
+taken (`mixture`).
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.search.inference import Inference
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.system.window_rows import WindowSystem
@@ -57,41 +58,38 @@ def settle_without_bad_windows(
 ) -> SettledSet:
     """Fit the windows that agree; few may be left out."""
 
-    def inference(left: Mask) -> Inference:
-        return Inference(
-            WindowSystem(_without_windows(rows, parameter_set, left), parameter_set),
-            nominal,
-            turns,
-        )
+    def fit_without(windows: Mask) -> GaussNewton:
+        kept = _without_windows(rows, parameter_set, windows)
+        return GaussNewton(WindowSystem(kept, parameter_set), nominal, turns)
 
     bad, score = np.zeros(len(parameter_set.window_positions), dtype=bool), np.nan
     # one bad window of six can be told from scatter, two of six cannot
     most = max(1, len(bad) // 6)
     for _ in range(1 + most):
-        now = inference(bad)
-        gram, found = _settled_fit(now, now, parameter_set)
-        worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
-        if worst.any() and (found.bad[worst] > thresholds.SUSPECT).all():
+        fit = fit_without(bad)
+        gram, mixture = _settled_fit(fit, fit, parameter_set)
+        worst = mixture.bad * ~bad == (mixture.bad * ~bad).max(initial=0.0)
+        if worst.any() and (mixture.bad[worst] > thresholds.SUSPECT).all():
             # a gross error moves the state out of the linear range
-            gram, found = _settled_fit(now, inference(bad | worst), parameter_set)
+            gram, mixture = _settled_fit(fit, fit_without(bad | worst), parameter_set)
         if not bad.any():
-            score = found.score
-        worst &= (found.bad > thresholds.CERTAIN) & ~bad
+            score = mixture.score
+        worst &= (mixture.bad > thresholds.CERTAIN) & ~bad
         if not worst.any() or bad.sum() >= most:
             break
         bad |= worst
-    found = replace(found, bad=np.where(bad, 1.0, found.bad))
-    return SettledSet(found, gram, tuple(now.turn_rows), score)
+    mixture = replace(mixture, bad=np.where(bad, 1.0, mixture.bad))
+    return SettledSet(mixture, gram, tuple(fit.turn_rows), score)
 
 
 def _settled_fit(
-    inference: Inference, settling: Inference, parameter_set: ParameterSet
+    fit: GaussNewton, settling: GaussNewton, parameter_set: ParameterSet
 ) -> tuple[Gram, Mixture]:
     """Fit of the likeliest explanation about the state to which other rows converge."""
-    gram = inference.gram(*_settled_state(settling, parameter_set), None)
+    gram = fit.gram(*_settled_state(settling, parameter_set), None)
     return gram, mixture_with_causes(
         parameter_set,
-        Search(parameter_set, gram),
+        Sets(parameter_set, gram),
         parameter_set.explanations[0].members,
     )
 
@@ -105,31 +103,31 @@ def _without_windows(rows: Rows, parameter_set: ParameterSet, bad: Mask) -> Rows
 
 
 def _settled_state(
-    inference: Inference, parameter_set: ParameterSet
+    fit: GaussNewton, parameter_set: ParameterSet
 ) -> tuple[State, Array]:
     """The state to which the set converges, and the values of its columns there."""
     start: Array = np.zeros(parameter_set.width)
-    state, values, _ = inference.settle(inference.nominal, start, parameter_set.members)
-    if inference.turns is None:
+    state, values, _ = fit.settle(fit.nominal, start, parameter_set.members)
+    if fit.turns is None:
         return state, values
     # windows measure only the Earth's rate: too little for scale factors of gyroscopes
     gyr = np.s_[parameter_set.scale + 3 : parameter_set.scale + 6]
     values[gyr] = 0.0
-    nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
+    nominal = np.append(state.scale[:3], fit.nominal.scale[3:])
     state = replace(state, scale=nominal)
-    state, values = _follow_turns_first(inference, parameter_set, state, values)
+    state, values = _follow_turns_first(fit, parameter_set, state, values)
     for again in range(MAX_TURN_INTEGRATIONS):
         if again:
-            inference.follow_turns(state, values)
+            fit.follow_turns(state, values)
         before = state.scale
-        state, values, _ = inference.settle(state, values, parameter_set.members)
+        state, values, _ = fit.settle(state, values, parameter_set.members)
         if np.abs(state.scale / before - 1).max() < MIN_SCALE_CHANGE:
             break
     return state, values
 
 
 def _follow_turns_first(
-    inference: Inference, parameter_set: ParameterSet, state: State, values: Array
+    fit: GaussNewton, parameter_set: ParameterSet, state: State, values: Array
 ) -> tuple[State, Array]:
     """Integrate the turns with the state from the windows, or with the nominal one.
 
@@ -137,20 +135,18 @@ def _follow_turns_first(
     turns contradict the positions. If fewer turns do so with nominal parameters, the
     fit continues from there. Returns the state and the values to continue with.
     """
-    astray = _contradicted_turns(inference, state, values)
-    if not astray:
+    contradicted = _contradicted_turns(fit, state, values)
+    if not contradicted:
         return state, values
-    nothing: Array = np.zeros(parameter_set.width)
-    if _contradicted_turns(inference, inference.nominal, nothing) < astray:
-        state, values, _ = inference.settle(
-            inference.nominal, nothing, parameter_set.members
-        )
+    zeros: Array = np.zeros(parameter_set.width)
+    if _contradicted_turns(fit, fit.nominal, zeros) < contradicted:
+        state, values, _ = fit.settle(fit.nominal, zeros, parameter_set.members)
         return state, values
-    inference.follow_turns(state, values)
+    fit.follow_turns(state, values)
     return state, values
 
 
-def _contradicted_turns(inference: Inference, state: State, values: Array) -> int:
+def _contradicted_turns(fit: GaussNewton, state: State, values: Array) -> int:
     """Number of turns that contradict the positions, integrated with a state."""
-    inference.follow_turns(state, values)
-    return len(inference.turns.tracker.contradicted_turns) if inference.turns else 0
+    fit.follow_turns(state, values)
+    return len(fit.contradicted_turns)

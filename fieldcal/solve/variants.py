@@ -14,9 +14,8 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.gram import Eliminated, evidence_gains
-from fieldcal.model.evidence.sets import variant_log_priors
+from fieldcal.model.evidence.sets import Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
-from fieldcal.model.search.selection import Search
 from fieldcal.solve.explanations import WeightedExplanation, has_equation
 
 REPRESENTATIVE_POINTS = 24
@@ -33,32 +32,34 @@ are more causes, over several of them alike."""
 
 
 def variants(
-    search: Search, known: tuple[Member, ...], one: WeightedExplanation
+    sets: Sets, known: tuple[Member, ...], explanation: WeightedExplanation
 ) -> list[WeightedExplanation]:
     """Variants of an explanation, with their probabilities if it is the right one.
 
     Parameters
     ----------
-    search : over the rows
+    sets : over the rows
     known : the other members of the set
-    one : the explanation
+    explanation : to be varied
 
     """
-    each = [_choices(search, (*known, *one.members), m) for m in one.members]
+    each = [
+        _choices(sets, (*known, *explanation.members), m) for m in explanation.members
+    ]
     each += [
-        _with_and_without(search, (*known, *one.members), m)
-        for m in one.possible_members
+        _with_and_without(sets, (*known, *explanation.members), m)
+        for m in explanation.possible_members
     ]
     share: dict[tuple[Member, ...], float] = {}
     points = spread_points(
-        len(each), max(1, round(REPRESENTATIVE_POINTS * one.probability))
+        len(each), max(1, round(REPRESENTATIVE_POINTS * explanation.probability))
     )
     for at in points:
         picked = [
             choices[choice_at(weight, u)]
             for u, (choices, weight) in zip(at, each, strict=True)
         ]
-        members = tuple(m for some in picked for m in some)
+        members = tuple(m for chosen in picked for m in chosen)
         share[members] = share.get(members, 0.0) + 1 / len(points)
     return [WeightedExplanation(members, p) for members, p in share.items()]
 
@@ -82,68 +83,66 @@ def spread_points(count: int, points: int = REPRESENTATIVE_POINTS) -> Array:
 
 
 def _choices(
-    search: Search, members: tuple[Member, ...], member: Member
+    sets: Sets, members: tuple[Member, ...], member: Member
 ) -> tuple[list[tuple[Member, ...]], Array]:
     """Variants of a cause of a set, and their probabilities."""
     cause, group = member
     if not (has_equation(group) and cause.variants[1:]):
         return [(member,)], np.ones(1)
-    score = _scores(search, members, member)
+    score = _scores(sets, members, member)
     weight: Array = np.exp(score - np.logaddexp.reduce(score))
     return [((cause, other),) for other in cause.variants], weight
 
 
 def _with_and_without(
-    search: Search, members: tuple[Member, ...], member: Member
+    sets: Sets, members: tuple[Member, ...], member: Member
 ) -> tuple[list[tuple[Member, ...]], Array]:
     """No further cause, or one of its variants, and their probabilities.
 
     The evidence of the best variant includes a new estimate of the instability.
     """
     cause = member[0]
-    score = _scores(search, members, member)
+    score = _scores(sets, members, member)
     best = (cause, cause.variants[int(np.argmax(score))])
-    gain = search.evaluate((*members, best)).score - search.evaluate(members).score
+    gain = sets.evaluate((*members, best)).score - sets.evaluate(members).score
     score = np.append(0.0, score - score.max() + gain)
     choices: list[tuple[Member, ...]] = [(), *(((cause, v),) for v in cause.variants)]
     out: Array = np.exp(score - np.logaddexp.reduce(score))
     return choices, out
 
 
-def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Array:
+def _scores(sets: Sets, members: tuple[Member, ...], member: Member) -> Array:
     """Log evidence of each variant of a cause with the other members, over all sizes.
 
     It includes the prior probability of each variant.
     """
     others, own = member[0].variants, member[1]
     every = np.unique(np.concatenate([g.columns for g in others]))
-    rest = _without_columns(search, members, own.columns)
+    rest = _without_columns(sets, members, own.columns)
     inner, rhs = rest.schur_complement(every, np.ones(len(every)))
     alone = np.diag(rest.rows.matrix(every, every))
     beside = [m for m in members if m[0].key != member[0].key]
     score = variant_log_priors(member[0], beside) + np.zeros(len(others))
     width = np.array([len(g.columns) for g in others])
     for k in np.unique(width).tolist():
-        some = np.flatnonzero(width == k)
-        at = np.searchsorted(every, [others[j].columns for j in some])
+        alike = np.flatnonzero(width == k)
+        at = np.searchsorted(every, [others[j].columns for j in alike])
         size = np.array(
-            [others[j].prior_sigma(others[j].fixed_size or 1.0) for j in some]
+            [others[j].prior_sigma(others[j].fixed_size or 1.0) for j in alike]
         )
         square = inner[at[:, :, None], at[:, None, :]]
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)
         gain = evidence_gains(square, rhs[at] * size, top)
-        known = np.array([others[j].fixed_size is not None for j in some])
+        known = np.array([others[j].fixed_size is not None for j in alike])
         summed = np.logaddexp.reduce(gain + LOG_DENSITY, axis=1)
-        score[some] += np.where(known, gain[:, UNIT_INDEX], summed)
+        score[alike] += np.where(known, gain[:, UNIT_INDEX], summed)
     return score
 
 
-def _without_columns(
-    search: Search, members: tuple[Member, ...], own: Index
-) -> Eliminated:
+def _without_columns(sets: Sets, members: tuple[Member, ...], own: Index) -> Eliminated:
     """A set without some columns, with the instability of windows unchanged."""
-    full = search.evaluate(members)
+    full = sets.evaluate(members)
     kept = ~np.isin(full.state.columns, own)
-    rows = search.gram_at(full.sizes.instability)
+    rows = sets.gram_at(full.sizes.instability)
     return Eliminated.of(rows, full.state.columns[kept], full.state.prior_sigma[kept])

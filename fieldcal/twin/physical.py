@@ -26,10 +26,9 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.model.search.inference import Inference
+from fieldcal.model.search.estimated_state import state_at_estimate
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
-from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.experience import Experience
 
 STANDS = 3.0
@@ -78,14 +77,14 @@ def _state_given_rate(
     explanation: Explanation, fitted: FittedSet, rate: Array
 ) -> State:
     """The fitted state, given the rate of the base, (3,) rad/s (1)."""
-    nominal = explanation.inferred.inference.nominal
-    inference = Inference(WindowSystem(fitted.rows, fitted.dictionary), nominal)
+    nominal = explanation.inferred.fit.nominal
     found, at = fitted.set.state, _base_rate_columns(fitted)
     if len(at):
         shared = found.inverse[:, at]
         off = np.linalg.solve(shared[at], rate - found.estimate[at])
         found = replace(found, estimate=found.estimate + shared @ off)
-    return inference.state_at_estimate(replace(fitted.set, state=found))[0]
+    given = replace(fitted.set, state=found)
+    return state_at_estimate(fitted.dictionary, nominal, given)[0]
 
 
 def from_one_instant(state: State, since: Array) -> State:

@@ -118,7 +118,7 @@ def _replay_cases(
     explanation: Explanation, profile: Profile, found: State, raw: FittedSet
 ) -> dict[str, _ReplayCase]:
     """The three devices, by name, with equal weights of their differences."""
-    best, nominal = explanation.best, explanation.inferred.inference.nominal
+    best, nominal = explanation.best, explanation.inferred.fit.nominal
     start = float(explanation.prepared.source.block.t[0])
     effects = twin.effects_of_terms(nominal.terms, start)
     sizes = replace(raw.set.sizes, instability=best.set.sizes.instability)
@@ -147,7 +147,7 @@ def _replay_case(
 ) -> _ReplayCase:
     """A device with its turns, if the diagnosis uses turns."""
     made: tuple[Turn, ...] = ()
-    if explanation.inferred.inference.turns is not None:
+    if explanation.inferred.fit.turns is not None:
         source, since = explanation.prepared.source, fitted.dictionary.since
         made = tuple(TurnTracker(source, fitted.rows, since).turns(state))
     return _ReplayCase(_without_random_effects(device), fitted, state, off, made)

@@ -74,10 +74,10 @@ class CellTable:
     @property
     def with_values(self) -> CellTable:
         """The cells that hold a value."""
-        some = self.counts.any(axis=1)
-        if some.all():
+        filled = self.counts.any(axis=1)
+        if filled.all():
             return self
-        return CellTable(self.times[some], self.sums[some], self.origin)
+        return CellTable(self.times[filled], self.sums[filled], self.origin)
 
     @property
     def counts(self) -> Array:

@@ -59,7 +59,7 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
     six : (n, 6) samples in `CHANNELS` order, nan where missing
 
     """
-    found = []
+    dead = []
     for sensor, channels in (("accelerometers", ACC), ("gyroscopes", GYR)):
         axes = _dead_axes(six[:, channels])
         if not axes:
@@ -70,8 +70,8 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
             what = "never changes, or is missing"
         message = f"the {sensor} are not used: {join_words(names)} {what}"
         numbers = tuple(channels.start + axis for axis in axes)
-        found.append(DeadSensor(channels, numbers, message))
-    return found
+        dead.append(DeadSensor(channels, numbers, message))
+    return dead
 
 
 def broken_axis_messages(six: Array) -> list[str]:
@@ -85,18 +85,20 @@ def broken_axis_messages(six: Array) -> list[str]:
     six : (n, 6) samples in `CHANNELS` order, nan where missing
 
     """
-    said = []
-    for one in dead_sensors(six):
-        stuck = [a for a in one.axes if np.isfinite(six[:, a]).any() and not one.absent]
+    messages = []
+    for sensor in dead_sensors(six):
+        stuck = [
+            a for a in sensor.axes if np.isfinite(six[:, a]).any() and not sensor.absent
+        ]
         if not stuck:
             continue
         names = [CHANNELS[a] for a in stuck]
         change = "change" if len(names) > 1 else "changes"
-        said.append(
+        messages.append(
             f"{join_words(names)} never {change} while the rest of the sensor does: a"
             " wire or the sensor is broken; repair it and record again"
         )
-    return said
+    return messages
 
 
 def _dead_axes(triad: Array) -> list[int]:
@@ -127,9 +129,9 @@ def without_dead_axes(six: Array) -> Array:
     dead = [axis for sensor in dead_sensors(six) for axis in sensor.axes]
     if not dead:
         return six
-    told = six.copy()
-    told[:, dead] = np.nan
-    return told
+    kept = six.copy()
+    kept[:, dead] = np.nan
+    return kept
 
 
 class LiveAxisRows:

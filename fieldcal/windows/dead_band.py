@@ -36,13 +36,13 @@ def dead_bands(block: Block) -> Array:
     >>> dead_bands(block).round(1).tolist()
     [0.0, 0.0, 0.0, 0.2, 0.2, 0.2]
     """
-    found = np.array([_nearest_value(v) for v in (*block.acc.T, *block.gyr.T)])
-    if found.any():
+    bands = np.array([_nearest_value(v) for v in (*block.acc.T, *block.gyr.T)])
+    if bands.any():
         felt = (block.acc != 0).any(axis=1)
-        there = felt | (block.gyr != 0).any(axis=1)
-        zeros = [(t == 0).sum(axis=0) for t in (block.acc[felt], block.gyr[there])]
-        found[np.concatenate(zeros) < MIN_SAMPLES] = 0.0
-    return found
+        received = felt | (block.gyr != 0).any(axis=1)
+        zeros = [(t == 0).sum(axis=0) for t in (block.acc[felt], block.gyr[received])]
+        bands[np.concatenate(zeros) < MIN_SAMPLES] = 0.0
+    return bands
 
 
 def _nearest_value(values: Array) -> float:
@@ -73,11 +73,11 @@ def dead_band_messages(block: Block, means: Array) -> Iterator[str]:
     """Sentences about the bands that hide what windows measured; `means` are (n, 6)."""
     band = dead_bands(block)
     hidden: NDArray[np.bool_] = np.any(error_of_means(means, band) > 0, axis=0)
-    for some, unit in ((ACC, "m/s²"), (GYR, "rad/s")):
-        names = [n for n, h in zip(CHANNELS[some], hidden[some], strict=True) if h]
+    for triad, unit in ((ACC, "m/s²"), (GYR, "rad/s")):
+        names = [n for n, h in zip(CHANNELS[triad], hidden[triad], strict=True) if h]
         if names:
             yield (
                 f"{join_words(names)} {'is' if len(names) == 1 else 'are'} zero where"
-                f" less than {band[some].max():.2g} {unit} is measured (a dead band):"
+                f" less than {band[triad].max():.2g} {unit} is measured (a dead band):"
                 " what that hides is in the uncertainties; switch it off in the device"
             )

@@ -38,7 +38,9 @@ STEPS_HIDDEN_NOISE = 1.5
 """Noise, in steps, below which single steps show around zero."""
 
 
-def rounding_variance(grain: Grain, mean: Array, sampled: Array, seen: Array) -> Array:
+def rounding_variance(
+    grain: Grain, mean: Array, sampled: Array, shown_steps: Array
+) -> Array:
     """Variance that rounding leaves in a mean, (6,).
 
     Parameters
@@ -46,10 +48,10 @@ def rounding_variance(grain: Grain, mean: Array, sampled: Array, seen: Array) ->
     grain : rounding that the device states
     mean : (6,) of the values
     sampled : (6,) standard deviation of the values at short lags
-    seen : (6,) steps as the values show them, where the device states none
+    shown_steps : (6,) steps as the values show them, where the device states none
 
     """
-    q = np.where(grain.step > 0, grain.step, seen)
+    q = np.where(grain.step > 0, grain.step, shown_steps)
     few = rounding.variance_of_few_values(grain.step, sampled)
     rounded = np.maximum(rounding.variance_of_mean(q, sampled), few)
     if not grain.cut:
@@ -77,13 +79,13 @@ def visible_step(grain: Grain, mean: Array, sampled: Array) -> Array:
 
 def _variance_around_zero(mean: Array, noise: Array) -> Array:
     """Variance from the wide step around zero, (3), in steps, (c,)."""
-    found = np.zeros(len(mean))
+    variance = np.zeros(len(mean))
     for i in np.flatnonzero(np.abs(mean) < AROUND_ZERO + 3 * noise):
         s = max(float(noise[i]), LEAST_NOISE)
-        found[i] = np.mean(
+        variance[i] = np.mean(
             [_offset_of_cut_values(mean[i] + u, s) ** 2 for u in MEAN_OFFSETS]
         )  # (3)
-    return found
+    return variance
 
 
 def _offset_of_cut_values(v: float, s: float) -> float:

@@ -103,29 +103,29 @@ class JumpFinder:
         """Start and end of each position, s; empty for a recording of another kind."""
         if not self._changes:
             return []
-        some = JumpRows(*map(np.concatenate, zip(*self._changes, strict=True)))
-        if not len(some.row):
+        changes = JumpRows(*map(np.concatenate, zip(*self._changes, strict=True)))
+        if not len(changes.row):
             return []
-        parts = np.flatnonzero(np.diff(some.row) > 1) + 1
-        first, last = np.append(0, parts), np.append(parts, len(some.row)) - 1
+        parts = np.flatnonzero(np.diff(changes.row) > 1) + 1
+        first, last = np.append(0, parts), np.append(parts, len(changes.row)) - 1
         if np.mean(last - first <= MEDIAN_ROWS) < LEAST_SHARE:
             return []
-        begins = np.vstack([self._begin[1], some.after[last]])
-        closes = np.vstack([some.before[first], self._end[1]])
+        begins = np.vstack([self._begin[1], changes.after[last]])
+        closes = np.vstack([changes.before[first], self._end[1]])
         rests = (np.abs(closes - begins) <= self._size).all(axis=1)
         middle = (first + last) // 2
-        return self._spans(JumpRows(*(x[middle] for x in some)), rests)
+        return self._spans(JumpRows(*(x[middle] for x in changes)), rests)
 
     def _spans(
-        self, some: JumpRows, rests: NDArray[np.bool_]
+        self, middles: JumpRows, rests: NDArray[np.bool_]
     ) -> list[tuple[float, float]]:
         """Start and end of each position, s, given the rows at which they begin."""
-        time = some.time
-        rows = np.diff(np.concatenate([[0], some.row, [self._rows]]))
+        time = middles.time
+        rows = np.diff(np.concatenate([[0], middles.row, [self._rows]]))
         long = rows >= FEWEST_ROWS
         if long.sum() < FEWEST_POSITIONS or rests[long].mean() < LEAST_SHARE:
             return []
-        differ = np.diff(np.concatenate([[0.0], some.steps, [self._steps]])) / rows
+        differ = np.diff(np.concatenate([[0.0], middles.steps, [self._steps]])) / rows
         quiet = max(float(differ[long].min()), self._least_jump)
         if (differ[long] > LARGEST_SCATTER_RATIO * quiet).mean() > 1 - LEAST_SHARE:
             return []
@@ -138,8 +138,8 @@ class JumpFinder:
 
 def _least_jump(step: Array) -> Array:
     """Least nonzero step, (3,); inf where there is none."""
-    found: Array = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
-    return found
+    least: Array = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
+    return least
 
 
 def _noise(step: Array) -> Array:

@@ -155,9 +155,9 @@ def error_of_mean(
     m = len(means)
     f, sums = fourier_sums(means - means.mean(axis=0), spacing)
     shape = SHAPES.spectra(f)
-    seen, q = log_likelihood(without_lines(np.abs(sums) ** 2), shape)
-    seen = seen if before is None else seen + before
-    weight = np.exp(_relative_to_largest(seen + SHAPES.log_prior[:, None]))
+    likelihood, q = log_likelihood(without_lines(np.abs(sums) ** 2), shape)
+    likelihood = likelihood if before is None else likelihood + before
+    weight = np.exp(_relative_to_largest(likelihood + SHAPES.log_prior[:, None]))
     weight = weight / weight.sum(axis=0)
     level = weight * q / max(1, len(f) - 1)
     once, twice = (
@@ -167,7 +167,9 @@ def error_of_mean(
     cross = (white.T @ white.conj()).real
     size = np.sqrt(np.diag(cross))
     scale = once / np.where(size > 0, size, 1.0)
-    return MeanError(cross * np.outer(scale, scale), twice, _relative_to_largest(seen))
+    return MeanError(
+        cross * np.outer(scale, scale), twice, _relative_to_largest(likelihood)
+    )
 
 
 def _relative_to_largest(log_likelihood: Array) -> Array:

@@ -84,8 +84,8 @@ def measure_noise(pieces: Sequence[Array], rate_hz: float) -> ChannelNoise:
     lengths = [anchor]
     while lengths[-1] > 1:
         lengths.append(max(1, lengths[-1] // 4))
-    found = [_level(pieces, m) for m in lengths]
-    levels, spreads = (np.array(both).T for both in zip(*found, strict=True))
+    measured = [_level(pieces, m) for m in lengths]
+    levels, spreads = (np.array(column).T for column in zip(*measured, strict=True))
     white = [_agreed_level(lengths, v, s) for v, s in zip(levels, spreads, strict=True)]
     # outputs coarser than their noise may not change at all while the device is held
     least = rounding.least_deviation(smallest_steps(pieces))
@@ -103,8 +103,8 @@ def is_to_and_fro(pieces: Sequence[Array]) -> bool:
     """
     longest = max((len(p) for p in pieces), default=0) // 4
     lengths = [1 << k for k in range(longest.bit_length())]
-    found = [_level(pieces, m)[0].sum() for m in lengths]
-    levels = np.array([v for v in found if np.isfinite(v)])
+    sums = [_level(pieces, m)[0].sum() for m in lengths]
+    levels = np.array([v for v in sums if np.isfinite(v)])
     if len(levels) < 3:
         return False
     top = levels.max()
@@ -171,8 +171,8 @@ def _second_differences(piece: Array, m: int, most: int) -> Array:
     """Second differences of means over m samples; of many, about `most` of them."""
     triples, channels = len(piece) // (3 * m), piece.shape[1]
     if triples > most:
-        some = piece[: 3 * m * triples].reshape(triples, -1)[:: triples // most]
-        means = _means(some.reshape(-1, m, channels)).reshape(-1, 3, channels)
+        selected = piece[: 3 * m * triples].reshape(triples, -1)[:: triples // most]
+        means = _means(selected.reshape(-1, m, channels)).reshape(-1, 3, channels)
         out: Array = np.diff(means, 2, axis=1)[:, 0]
         return out
     whole = len(piece) // m * m
@@ -221,7 +221,9 @@ def _white_under_walk(
     return None
 
 
-def _levels_agree(one: float, other: float, spread: float, finer: float) -> bool:
+def _levels_agree(
+    level: float, other_level: float, spread: float, finer: float
+) -> bool:
     """Whether two levels agree within their relative errors."""
-    error = np.hypot(spread, finer) * max(one, other)
-    return bool(abs(one - other) <= AGREE * error)
+    error = np.hypot(spread, finer) * max(level, other_level)
+    return bool(abs(level - other_level) <= AGREE * error)

@@ -81,8 +81,8 @@ class PiecedWindow:
         if self._kept is None:
             return now
         before = self._kept.sigma
-        both = 1 / np.sqrt(1 / before**2 + 1 / now**2)
-        return np.where(np.isfinite(both), both, before)
+        combined = 1 / np.sqrt(1 / before**2 + 1 / now**2)
+        return np.where(np.isfinite(combined), combined, before)
 
     @property
     def noise(self) -> LearnedNoise | None:

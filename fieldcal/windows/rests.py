@@ -139,18 +139,18 @@ def find_rest_runs(rows: CellRows, bound: Array) -> list[RestRun]:
     every = -(-len(rows) // _SAMPLE)
     # all spans of a long recording do not fit into memory: they are calculated twice
     short = list(_spans(rows, usual)) if len(rows) <= _PART else []
-    some = np.concatenate(
+    sampled = np.concatenate(
         [
             spread[-first % every :: every].copy()
             for first, spread, _ in short or _spans(rows, usual)
         ]
     )
-    some = some[np.isfinite(some).all(axis=1)]
-    if not len(some):
+    sampled = sampled[np.isfinite(sampled).all(axis=1)]
+    if not len(sampled):
         return []
-    quiet = np.quantile(some, 0.1, axis=0)
+    quiet = np.quantile(sampled, 0.1, axis=0)
     scale = np.where(quiet > 0, quiet, np.inf)
-    valley = np.clip(_splitting_threshold((some / scale).max(axis=1)), _LEAST, _MOST)
+    valley = np.clip(_splitting_threshold((sampled / scale).max(axis=1)), _LEAST, _MOST)
     kept: list[RestRun] = []
     spans = short or _spans(rows, usual)
     least = np.maximum(np.minimum(valley * scale, bound), usual.flips)

@@ -172,18 +172,18 @@ def _is_untouched(before: CellTable, way: Block, after: CellTable) -> bool:
         np.vstack([before.short_lag_variance, after.short_lag_variance])
     ).mean(axis=0)
     noise = noise + np.maximum(before.rounding, after.rounding) ** 2
-    one = before.origin + fill_with_previous(before.means)[-CELLS_BESIDE_GAP:].mean(
-        axis=0
-    )
+    last_level = before.origin + fill_with_previous(before.means)[
+        -CELLS_BESIDE_GAP:
+    ].mean(axis=0)
     other = after.origin + fill_with_previous(after.means)[:CELLS_BESIDE_GAP].mean(
         axis=0
     )
-    known = np.isfinite(one + other + noise) & (noise > 0)
+    known = np.isfinite(last_level + other + noise) & (noise > 0)
     six = way.six[:, known]
     if not np.isfinite(six).all():
         return False
     early, late = (np.cumsum((np.square(six - level[known]) / noise[known]).sum(axis=1))
-                   for level in (one, other))  # fmt: skip
+                   for level in (last_level, other))  # fmt: skip
     early, late = np.append(0.0, early), np.append(0.0, late)
     least = float((early + late[-1] - late).min())
     return chi2_tail(least, six.size) > NOISE_PROBABILITY
@@ -218,9 +218,9 @@ def probability_unmoved(
     leans = float(np.linalg.norm(change[:3]) / np.linalg.norm(level[:3]))
     if not np.fmax(most, leans) < LARGEST_ANGLE:
         return 0.0
-    seen = np.concatenate([change[:3], turned])
+    change_and_turn = np.concatenate([change[:3], turned])
     noise = np.concatenate([spread[:3], unsure])
-    known = np.isfinite(seen) & np.isfinite(noise) & (noise > 0)
+    known = np.isfinite(change_and_turn) & np.isfinite(noise) & (noise > 0)
     known[:3] &= known[:3].all()
     if not known[0] and not known[3:].all():
         return 0.0
@@ -228,7 +228,8 @@ def probability_unmoved(
     jump = np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) * TYPICAL_JUMP**2
     logs = np.array(
         [
-            np.log(p * q) + _log_density(seen, np.diag(noise) + turn + step, known)
+            np.log(p * q)
+            + _log_density(change_and_turn, np.diag(noise) + turn + step, known)
             for p, turn in (
                 (PRIOR_UNMOVED, np.zeros((6, 6))),
                 (1 - PRIOR_UNMOVED, TYPICAL_ROTATION**2 * lean @ lean.T),
@@ -256,12 +257,12 @@ def _compare_means(
         fill_with_previous(after.means),
     )
     fewest = min(len(left), len(right))
-    both = np.vstack([left[::-1], right])
+    rows = np.vstack([left[::-1], right])
     longer = EXTRA_LEVELS * (
-        len(both) > LENGTH_RATIO * 2 ** (LEVELS + EXTRA_LEVELS - 1)
+        len(rows) > LENGTH_RATIO * 2 ** (LEVELS + EXTRA_LEVELS - 1)
     )
-    allan = estimate_quiet_noise(both, levels=LEVELS + longer).allan
-    found = []
+    allan = estimate_quiet_noise(rows, levels=LEVELS + longer).allan
+    comparisons = []
     for k, a in enumerate(allan[: fewest.bit_length()]):
         n = 2**k
         apart = gap + n * CELL
@@ -270,12 +271,12 @@ def _compare_means(
         ) / 2
         spread = 2 * a**2 * flicker_bias_function(1 + gap / (n * CELL))  # (3)
         means = left[:n].mean(axis=0), right[:n].mean(axis=0)
-        found.append((*means, spread + (drift * apart) ** 2))
-    table = np.array(found)
+        comparisons.append((*means, spread + (drift * apart) ** 2))
+    table = np.array(comparisons)
     best = np.argmin(table[:, 2], axis=0)
-    one, other, spread = table[best, :, np.arange(6)].T
+    mean, other, spread = table[best, :, np.arange(6)].T
     coarse = np.maximum(before.rounding, after.rounding)
-    return before.origin + (one + other) / 2, other - one, spread + coarse**2 / 6
+    return before.origin + (mean + other) / 2, other - mean, spread + coarse**2 / 6
 
 
 def _slope(means: Array) -> Array:
@@ -339,9 +340,11 @@ def _cross_matrix(v: Array) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def _log_density(seen: Array, covariance: Array, known: NDArray[np.bool_]) -> float:
+def _log_density(
+    difference: Array, covariance: Array, known: NDArray[np.bool_]
+) -> float:
     """Log of the normal density of the known ones among some values."""
     part = covariance[np.ix_(known, known)]
     root = np.linalg.cholesky(part)
-    white = np.linalg.solve(root, seen[known])
+    white = np.linalg.solve(root, difference[known])
     return float(-np.log(root.diagonal()).sum() - white @ white / 2)

@@ -53,4 +53,4 @@ def _limited_steps(triad: Array) -> Array:
 def _median(step: Array) -> Array:
     """Median of each column (n, 3) over what is known; 0 where nothing is."""
     known = [column[np.isfinite(column)] for column in step.T]
-    return np.array([np.median(one) if len(one) else 0.0 for one in known])
+    return np.array([np.median(axis) if len(axis) else 0.0 for axis in known])

@@ -60,8 +60,8 @@ def _end_reason(beyond: Array, inside: CellTable, origin: Array, side: int) -> s
     steps = np.abs(np.diff(beyond[:, 0], prepend=edge)) - inside.period
     paused = np.flatnonzero(steps > MIN_PAUSE_S)
     near = beyond[: paused[0]] if len(paused) else beyond
-    if said := _motion_phrase(near, inside, origin):
-        return said
+    if phrase := _motion_phrase(near, inside, origin):
+        return phrase
     if len(paused):
         return f"a pause of {steps[paused[0]]:.3g} s"
     if len(beyond) < round(BEYOND / CELL):

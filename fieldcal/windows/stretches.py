@@ -79,11 +79,11 @@ def still_stretches_of_file(
         (r.first + SPREAD_CELLS // 2, r.last - 1 + SPREAD_CELLS // 2) for r in runs
     ]
     goes_on = [i > 0 and runs[i - 1].last == r.first for i, r in enumerate(runs)]
-    found = _join_at_seams(
+    joined = _join_at_seams(
         _passing_parts_of_stretches(rows, origin, between, middles, shortest), goes_on
     )
-    if len(found) >= MIN_STRETCHES or len(runs) < MIN_STRETCHES:
-        return found
+    if len(joined) >= MIN_STRETCHES or len(runs) < MIN_STRETCHES:
+        return joined
     # rests may all be short: use the whole of their spans, less a cell at each end
     ends = [run.last + SPREAD_CELLS - 2 for run in runs]
     nexts = [*(run.first for run in runs[1:]), len(rows)]
@@ -93,7 +93,7 @@ def still_stretches_of_file(
     short = _join_at_seams(
         _passing_parts_of_stretches(rows, origin, between, whole, shortest), goes_on
     )
-    return short if len(short) >= MIN_STRETCHES else found
+    return short if len(short) >= MIN_STRETCHES else joined
 
 
 def _passing_parts_of_stretches(
@@ -104,21 +104,21 @@ def _passing_parts_of_stretches(
     shortest: float,
 ) -> list[list[tuple[float, float]]]:
     """Parts of each stretch of cells [first, last) that pass the test of a window."""
-    found: list[list[tuple[float, float]]] = []
+    passing: list[list[tuple[float, float]]] = []
     for first, last in stretches:
         cells = cell_table(rows[first : last + 1], origin)
         if clear := _passes_clearly(cell_table(rows[first:last], origin), shortest):
-            found.append([clear])
+            passing.append([clear])
         elif len(cells):
             start, end = float(cells.times[0]), float(cells.times[-1])
-            found.append(_passing_parts(between, start, end, shortest))
+            passing.append(_passing_parts(between, start, end, shortest))
         else:
-            found.append([])
-    return found
+            passing.append([])
+    return passing
 
 
 def _join_at_seams(
-    found: Sequence[Sequence[tuple[float, float]]], goes_on: Sequence[bool]
+    stretches_of_parts: Sequence[Sequence[tuple[float, float]]], goes_on: Sequence[bool]
 ) -> list[tuple[float, float]]:
     """Stretches in order; those divided only by a seam are joined.
 
@@ -126,8 +126,8 @@ def _join_at_seams(
     the rest of the part before.
     """
     out: list[tuple[float, float]] = []
-    for some, same in zip(found, goes_on, strict=True):
-        rest = list(some)
+    for part, same in zip(stretches_of_parts, goes_on, strict=True):
+        rest = list(part)
         if same and out and rest and rest[0][0] - out[-1][1] < SEAM_S:
             out[-1] = (out[-1][0], rest.pop(0)[1])
         out += rest

@@ -70,19 +70,19 @@ def find_sway(t: Array, six: Array, scale: Array) -> list[SwayWaves]:
     Waves of each stretch of up to `LONGEST_STRETCH_S` s; empty if nothing sways.
 
     """
-    seen = six if np.isfinite(six[:, 3:]).any() else six[:, :3]
-    known = np.isfinite(seen).all(axis=1)
-    t, six = t[known], seen[known]
+    channels = six if np.isfinite(six[:, 3:]).any() else six[:, :3]
+    known = np.isfinite(channels).all(axis=1)
+    t, six = t[known], channels[known]
     parts = (
         max(1, int(np.ceil((t[-1] - t[0]) / LONGEST_STRETCH_S))) if len(t) > 1 else 1
     )
     if parts > len(t):  # samples minutes apart, or times in another unit
         return []
-    found = [
+    waves = [
         _waves_of_stretch(t[some], six[some], scale)
         for some in np.array_split(np.arange(len(t)), parts)
     ]
-    out = [one for one in found if one is not None]
+    out = [wave for wave in waves if wave is not None]
     return out if len(out) == parts else []
 
 
@@ -109,13 +109,13 @@ def _waves_of_stretch(t: Array, six: Array, scale: Array) -> SwayWaves | None:
     hz = wave_frequencies(at, y, hz, 1 / (8 * span))
     whole = with_turn_rates if alone else _fit_arm
     first = fit_waves(at, y, hz, plain)
-    if first is None or not (found := whole(first)):
+    if first is None or not (waves := whole(first)):
         return None
     # the squares contain waves, part of which the first fit took for sway
-    again = fit_waves(at, y - found.second_order(at)[:, : y.shape[1]], hz, found)
+    again = fit_waves(at, y - waves.second_order(at)[:, : y.shape[1]], hz, waves)
     if again is not None:
-        found = with_turn_rates(again) if alone else again
-    return found if found.periods > PERIODS else None
+        waves = with_turn_rates(again) if alone else again
+    return waves if waves.periods > PERIODS else None
 
 
 def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
@@ -146,10 +146,10 @@ def _oscillates(angle: Array) -> bool:
     return float((about**2).sum(axis=1).mean()) > LEAST_ROTATION**2 / 2
 
 
-def _fit_arm(found: SwayWaves) -> SwayWaves | None:
+def _fit_arm(waves: SwayWaves) -> SwayWaves | None:
     """The waves with r of (1); None if accelerometers do not confirm the rotation."""
-    t, strong = np.linspace(*found.span, POINTS), _significant(found)
-    made = np.cross(found.force, strong.turn_angle(t))
+    t, strong = np.linspace(*waves.span, POINTS), _significant(waves)
+    made = np.cross(waves.force, strong.turn_angle(t))
     speeding = strong.turn_angle(t, 2)
     design = np.stack([np.cross(speeding, e) for e in np.eye(3)] + [made], axis=2)
     design = design.reshape(-1, 4) * np.array(
@@ -166,17 +166,17 @@ def _fit_arm(found: SwayWaves) -> SwayWaves | None:
             design.T @ design / noise + np.eye(4), design.T @ rest / noise
         )
     across = (rest - design @ known).reshape(-1, 3)  # a ship heaves as well
-    across -= np.outer(across @ found.force, found.force) / (found.force @ found.force)
+    across -= np.outer(across @ waves.force, waves.force) / (waves.force @ waves.force)
     arm = TYPICAL_ARM_M * known[:3]
     alike = float((across**2).sum()) < MAX_UNEXPLAINED * power
     return (
-        replace(found, arm=arm) if alike and np.abs(arm).max() < LONGEST_ARM_M else None
+        replace(waves, arm=arm) if alike and np.abs(arm).max() < LONGEST_ARM_M else None
     )
 
 
-def _significant(found: SwayWaves) -> SwayWaves:
+def _significant(waves: SwayWaves) -> SwayWaves:
     """The waves above noise: second derivatives of fast noise would dominate."""
-    pulse = 2 * np.pi * found.hz
-    power = (found.cos[:, 3:] ** 2 + found.sin[:, 3:] ** 2).sum(axis=1) / pulse**2
+    pulse = 2 * np.pi * waves.hz
+    power = (waves.cos[:, 3:] ** 2 + waves.sin[:, 3:] ** 2).sum(axis=1) / pulse**2
     kept = power > LEAST_POWER_SHARE * power.max()
-    return replace(found, hz=found.hz[kept], cos=found.cos[kept], sin=found.sin[kept])
+    return replace(waves, hz=waves.hz[kept], cos=waves.cos[kept], sin=waves.sin[kept])

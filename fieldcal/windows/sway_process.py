@@ -96,15 +96,15 @@ class _WaveProcess:
         power = (2 / self.count * pull[:-1] / self.size) ** 2
         v = (power[at] + power[at + count]).mean(axis=1) / 2
         for _ in range(MAX_ROUNDS):
-            both = np.concatenate([at, at + count])
-            every, half = np.append(both, 2 * count), len(at)
-            wide = np.sqrt(np.tile(v[at], 2))[:, None] * self.size[both]
+            columns = np.concatenate([at, at + count])
+            every, half = np.append(columns, 2 * count), len(at)
+            wide = np.sqrt(np.tile(v[at], 2))[:, None] * self.size[columns]
             wide = np.vstack([wide, self.drift])
             mean, cov = _posterior(gram[np.ix_(every, every)], pull[every], wide, noise)
             known = np.clip(1 - np.einsum("ckk->kc", cov) / wide**2, 1e-12, 1.0)
             share = [
                 (x[:half] + x[half:]).sum(axis=1)
-                for x in ((mean[:-1] / self.size[both]) ** 2, known[:-1])
+                for x in ((mean[:-1] / self.size[columns]) ** 2, known[:-1])
             ]
             v[at] = share[0] / share[1]
             rest = self.off - self.free[:, every] @ mean
@@ -147,13 +147,13 @@ def needed_seconds(waves: SwayWaves) -> float:
     With waves of these sizes and unknown phases, no mean has more than `WORSE` times
     its uncertainty by noise, and the window has periods enough to find the frequency.
     """
-    seen = np.isfinite(waves.noise)
-    power = ((waves.cos**2 + waves.sin**2) / 2)[:, seen]
+    measured = np.isfinite(waves.noise)
+    power = ((waves.cos**2 + waves.sin**2) / 2)[:, measured]
     for seconds in LADDER:
         if seconds * waves.mean_hz < PERIODS:
             continue
         t = np.arange(0.0, seconds, PLANNED_STEP_S) - seconds / 2
-        noise = waves.noise[seen] * waves.length / PLANNED_STEP_S
+        noise = waves.noise[measured] * waves.length / PLANNED_STEP_S
         wave = np.multiply.outer(t, 2 * np.pi * waves.hz)
         table = np.hstack([np.cos(wave), np.sin(wave)])
         flat = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
@@ -183,21 +183,21 @@ def _line_frequencies(t: Array, y: Array, hz: Array) -> Array:
     white = y / noise
     step = float(hz[1] - hz[0]) / 2 if len(hz) > 1 else float(hz[0]) / 2
     grid = np.arange(hz[0], hz[-1], 2 * step / (GRID_PER_CYCLE / 4))
-    found: list[float] = []
+    frequencies: list[float] = []
     for _ in range(REFINED_LINES):
-        rest = without_waves(t, white, found)
+        rest = without_waves(t, white, frequencies)
         power = np.abs(np.exp(-2j * np.pi * np.outer(grid, t)) @ rest) ** 2
         at = float(grid[int(np.argmax(power.sum(axis=1)))])
-        found.append(at)
+        frequencies.append(at)
         for width in step / 2.0 ** np.arange(1, 9):
-            for i in range(len(found)):
-                near = found[i] + width * np.array([-1.0, 0.0, 1.0])
-                others = [*found[:i], *found[i + 1 :]]
+            for i in range(len(frequencies)):
+                near = frequencies[i] + width * np.array([-1.0, 0.0, 1.0])
+                others = [*frequencies[:i], *frequencies[i + 1 :]]
                 left = [
                     (without_waves(t, white, [*others, f]) ** 2).sum() for f in near
                 ]
-                found[i] = float(near[int(np.argmin(left))])
-    return np.array(found)
+                frequencies[i] = float(near[int(np.argmin(left))])
+    return np.array(frequencies)
 
 
 def without_waves(t: Array, y: Array, hz: Sequence[float]) -> Array:

@@ -183,11 +183,6 @@ class Window:
         return self._current_verdict().ratio_now
 
     @property
-    def largest_motion(self) -> float:
-        """Largest departure from rest over the allowed one; above 1 it moved."""
-        return self._current_verdict().worst.ratio
-
-    @property
     def disturbance(self) -> Moved | None:
         """The disturbance, if there was one; None while the window is good."""
         worst = self._current_verdict().worst

@@ -28,7 +28,7 @@ def side(square: tuple[float, float], sigma: tuple[float, float]) -> Any:
 
     dictionary = SimpleNamespace(filters=GROUP)
     return SimpleNamespace(
-        estimate=estimate, inference=SimpleNamespace(dictionary=dictionary)
+        estimate=estimate, fit=SimpleNamespace(dictionary=dictionary)
     )
 
 
@@ -72,7 +72,7 @@ def test_filters_that_are_alike_are_no_difference(
 
 def test_without_turns_nothing_is_said() -> None:
     nothing = SimpleNamespace(filters=None)
-    bare = SimpleNamespace(inference=SimpleNamespace(dictionary=nothing))
+    bare = SimpleNamespace(fit=SimpleNamespace(dictionary=nothing))
     assert not against(side(SOME, SIGMA), bare)
 
 

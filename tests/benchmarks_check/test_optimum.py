@@ -35,6 +35,6 @@ def test_a_set_without_what_is_there_is_overlooking_it() -> None:
     one = compared(session, SEED)
     assert one.right and one.overlooked <= NEARLY and one.there is not None
     found = explain(prepare_recording(session.record(SEED), session.about)).inferred
-    nothing = one._replace(found=found.search.evaluate(()))
+    nothing = one._replace(found=found.search.sets.evaluate(()))
     assert nothing.overlooked > 10.0 and not nothing.right
     assert best_of_these(found, ("no such effect",)) is None

@@ -31,13 +31,13 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, Explanation]
 def weighed(explanation: Explanation, *shares: float) -> list[str]:
     """Give so much to the empty set and to sets of one effect; names of those."""
     posterior = explanation.posterior
-    visited = list(posterior.search.visited.values())
+    visited = list(posterior.sets.visited.values())
     empty = next(s for s in visited if not s.members)
     alone: dict[str, object] = {}
-    for offer in posterior.search.offers(empty):
+    for offer in posterior.search.offers.ranked(empty):
         name = offer.member[0].name
         if name in catalogue() and name not in alone:
-            alone[name] = posterior.search.accept(empty, offer)
+            alone[name] = posterior.search.offers.accept(empty, offer)
         if len(alone) == len(shares) - 1:
             break
     sets = [empty, *alone.values()]

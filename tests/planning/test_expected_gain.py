@@ -252,14 +252,14 @@ def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None
     posterior = found.posterior
     causes = {c.key: c for c in found.dictionary.causes}
     other = causes["warm_up:gyr"]
-    there = posterior.search.evaluate(((other, other.variants[3]),))
-    nearer = found.inferred.inference.refine_beside(found.inferred, there)
+    there = posterior.sets.evaluate(((other, other.variants[3]),))
+    nearer = found.inferred.with_refined_shapes(there)
     likely = replace(nearer, score=found.best.set.score)
     posterior._nearer.append((there, likely))
     at_points = dict(posterior.weights_on_grid)
     assert sum(at_points.values()) == pytest.approx(1.0)
     assert at_points[there] >= dict(posterior.weights)[likely] > 0.3
-    assert likely.state.columns.max() >= len(posterior.search.gram.index)
+    assert likely.state.columns.max() >= len(posterior.sets.gram.index)
     assert np.isfinite(gain_of(found).of(LADDER[:2]).gain).all()
 
 
@@ -296,8 +296,8 @@ def test_a_search_that_begins_with_what_was_found_before_finds_the_same(
         c.key for c, _ in whole.best.set.members
     ]
     # what was found before, it tries as well to do without
-    most = 1.25 * len(whole.inferred.search.visited)
-    assert len(quick.inferred.search.visited) < most
+    most = 1.25 * len(whole.inferred.search.sets.visited)
+    assert len(quick.inferred.search.sets.visited) < most
     worth, full = (gain_of(one).of(LADDER) for one in (quick, whole))
     # a set as likely as 0.02 may be looked at by one of them alone
     np.testing.assert_allclose(worth.gain, full.gain, rtol=0.05, atol=0.06)

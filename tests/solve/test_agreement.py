@@ -15,9 +15,9 @@ from fieldcal.model.state import State
 from fieldcal.solve import agreement, solve
 from fieldcal.solve.base_rate import with_base_rate
 from fieldcal.solve.estimation import ParameterEstimate, estimate_parameters
+from fieldcal.solve.observation_rows import rows_of_observations
 from fieldcal.solve.observations import Index
 from fieldcal.solve.parameter_set import ParameterSetOptions
-from fieldcal.solve.rows import rows_of_means
 
 SIZE = np.array([1e-3, 2e-3, 0.7e-3])
 PLACES = tuple(
@@ -34,7 +34,7 @@ def found(
 ) -> ParameterEstimate:
     seen = observe(places, u)
     seen.covariance[:, range(3), range(3)] = SIZE**2
-    recorded = rows_of_means(seen)
+    recorded = rows_of_observations(seen)
     rows = with_base_rate(recorded.rows, np.zeros(3))
     nominal = State(np.zeros(6), np.ones(6), np.zeros((len(places), 2)), np.zeros(3))
     wanted = ParameterSetOptions(angles_deg=degrees)
@@ -215,7 +215,7 @@ def test_directions_that_nothing_shows_take_no_degree_of_freedom() -> None:
     faces = np.vstack([np.eye(3), -np.eye(3)])
     u = BIAS + SCALE * G * np.vstack([faces, faces])
     seen = observe((HAND,) * 12, u)
-    recorded = rows_of_means(seen)
+    recorded = rows_of_observations(seen)
     nominal = State(np.zeros(6), np.ones(6), np.zeros((12, 2)), np.zeros(3))
     crossed = estimate_parameters(
         recorded, None, nominal, ParameterSetOptions(cross=True)
@@ -227,13 +227,11 @@ def test_what_does_not_turn_has_no_direction_of_its_rate() -> None:
     """Of a device at rest on a base that does not turn, laid by hand."""
     places = (*PLACES, HAND)
     one = found(places, outputs([*PLACES, PLACES[0]]))
-    known = (one.search.gram.info[: len(places), 3:] > 0).ravel()
-    means = agreement._MeasuredMeans(
-        one.search.gram, one.parameter_set, (3, 4, 5), known
-    )
+    known = (one.sets.gram.info[: len(places), 3:] > 0).ravel()
+    means = agreement._MeasuredMeans(one.sets.gram, one.parameter_set, (3, 4, 5), known)
     assert np.isnan(means._force_direction(len(places) - 1)).all()
     forces = agreement._MeasuredMeans(
-        one.search.gram, one.parameter_set, (0, 1, 2), known
+        one.sets.gram, one.parameter_set, (0, 1, 2), known
     )
     assert np.isfinite(forces._force_direction(len(places) - 1)).all()
 
@@ -244,7 +242,7 @@ def test_a_length_of_which_an_axis_is_clipped_is_no_length() -> None:
     u = by_hand(n)
     seen = observe((HAND,) * n, u)
     seen.mean[clipped, 1] = np.nan
-    recorded = rows_of_means(seen)
+    recorded = rows_of_observations(seen)
     nominal = State(np.zeros(6), np.ones(6), np.zeros((n, 2)), np.zeros(3))
     one = estimate_parameters(recorded, None, nominal, ParameterSetOptions())
     assert np.isnan(one.acc.residuals[clipped]).all()

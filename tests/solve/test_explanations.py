@@ -14,9 +14,9 @@ from fieldcal.core.positions import SIX_FACES, Position
 from fieldcal.model.causes.effect_causes import effect_causes
 from fieldcal.model.causes.random_causes import random_causes
 from fieldcal.model.causes.unknown_causes import unknown_causes
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.search.inference import Inference
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve import Observations
@@ -26,8 +26,8 @@ from fieldcal.solve.estimation import (
     estimate_parameters,
 )
 from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.observation_rows import rows_of_observations
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
-from fieldcal.solve.rows import rows_of_means
 from fieldcal.solve.variants import spread_points, variants
 
 PLACES = (
@@ -52,7 +52,7 @@ def seen(drift: float = DRIFT, noise: int | None = None) -> Observations:
 
 def recording(drift: float = DRIFT, noise: int | None = None) -> RecordedRows:
     """Its rows, with the time since the start."""
-    return rows_of_means(seen(drift, noise))
+    return rows_of_observations(seen(drift, noise))
 
 
 def given(shown: Sequence[WeightedExplanation] = ()) -> ParameterSet:
@@ -313,10 +313,10 @@ def test_a_cause_is_on_every_axis_that_it_may_be_on() -> None:
         ParameterSetOptions(),
         shown,
     )
-    gram = Inference(WindowSystem(recorded.rows, d), NOMINAL).gram(
+    gram = GaussNewton(WindowSystem(recorded.rows, d), NOMINAL).gram(
         NOMINAL, np.zeros(d.width), None
     )
-    found = variants(Search(d, gram), d.base_members, d.explanations[0])
+    found = variants(Sets(d, gram), d.base_members, d.explanations[0])
     assert sum(s.probability for s in found) == pytest.approx(1.0)
     sets = {s.members[0][1].params: s.probability for s in found}
     assert sum(p for axes, p in sets.items() if 0 in axes) > 0.99

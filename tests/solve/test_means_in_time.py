@@ -11,14 +11,14 @@ from observed import observe, outputs
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.core.samples import Array
 from fieldcal.physics.experience import Experience
-from fieldcal.solve.rows import rows_of_means
+from fieldcal.solve.observation_rows import rows_of_observations
 
 MINUTES = 60.0 * np.array([3.0, 1.0, 2.0, 5.0, 8.0])
 
 
 def inputs(time: Array) -> Experience:
     seen = observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS))
-    return rows_of_means(replace(seen, time=time)).rows.x
+    return rows_of_observations(replace(seen, time=time)).rows.x
 
 
 def test_times_count_from_the_earliest_window() -> None:

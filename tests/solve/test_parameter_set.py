@@ -23,8 +23,8 @@ from fieldcal.model.causes.detents import detents
 from fieldcal.physics.experience import Experience
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.base_rate import with_base_rate
+from fieldcal.solve.observation_rows import rows_of_observations
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
-from fieldcal.solve.rows import rows_of_means
 
 HAND = Position("by hand")
 ACC = [f"acc_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
@@ -41,7 +41,7 @@ def seen(places: tuple[Position, ...], gyr: bool = False) -> Observations:
 def given(
     places: tuple[Position, ...], wanted: ParameterSetOptions, gyr: bool = False
 ) -> ParameterSet:
-    recorded = rows_of_means(seen(places, gyr))
+    recorded = rows_of_observations(seen(places, gyr))
     rows = with_base_rate(recorded.rows, np.zeros(3))
     return ParameterSet(rows, np.ones(6), recorded.since_turn, wanted.turned, wanted)
 
@@ -240,7 +240,7 @@ def test_no_unknown_function_and_no_cause_is_searched_for() -> None:
 
 def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
     """Toward zero from either side; of values of both signs by less."""
-    recorded = rows_of_means(seen(FIVE_POSITIONS))
+    recorded = rows_of_observations(seen(FIVE_POSITIONS))
     y = recorded.rows.y.copy()
     y[:, 0] = [0.5, -0.5, 0.005, -0.02, np.nan]
     rows = with_base_rate(replace(recorded.rows, y=y), np.zeros(3))

@@ -24,8 +24,8 @@ from fieldcal.solve.estimation import (
     estimate_parameters,
 )
 from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.observation_rows import rows_of_observations
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
-from fieldcal.solve.rows import rows_of_means
 from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
 PLACES = (*SIX_FACES, *(Position.deg(a, b) for a, b in [(45, 0), (0, 45), (0, 0)]))
@@ -40,7 +40,7 @@ def recording(change: Array, noise: Array, drift: Array = DRIFT) -> RecordedRows
     """Windows of a device that changes with time: biases, and scale factors."""
     force = (outputs(PLACES, bias=np.zeros(3)) / SCALE) * TIMES[:, None]
     acc = outputs(PLACES) + drift * TIMES[:, None] + change * force + noise
-    return rows_of_means(replace(observe(PLACES, acc), time=TIMES))
+    return rows_of_observations(replace(observe(PLACES, acc), time=TIMES))
 
 
 CALM = recording(np.zeros(3), np.zeros((COUNT, 3)))
@@ -54,7 +54,7 @@ def given(wanted: ParameterSetOptions | None = None) -> ParameterSet:
 
 def with_gyroscopes() -> ParameterSet:
     seen = observe(PLACES, outputs(PLACES), gyr=np.zeros((COUNT, 3)))
-    rows = rows_of_means(replace(seen, time=TIMES))
+    rows = rows_of_observations(replace(seen, time=TIMES))
     return ParameterSet(
         rows.rows, np.ones(6), rows.since_turn, False, ParameterSetOptions()
     )
@@ -174,7 +174,7 @@ def test_scale_factors_beside_a_course_without_physics_are_those_at_the_end() ->
         scales *= 0.25 / 9.80665
         noise = 1e-4 * rng.standard_normal((COUNT, 3))
         acc = outputs(PLACES) + waves @ bias.T + waves @ scales.T * force / SCALE
-        rows = rows_of_means(
+        rows = rows_of_observations(
             replace(observe(PLACES, acc + noise, sigma=1e-4), time=TIMES)
         )
         one = estimate_parameters(

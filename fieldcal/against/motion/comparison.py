@@ -31,6 +31,7 @@ from fieldcal.diagnosis.result import Quantity
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.rows.reference import MIN_CHANNEL_SAMPLES, Reference
 from fieldcal.model.rows.thermometer import Thermometer
+from fieldcal.model.search.set_at_instability import with_typical_calibration
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 
@@ -59,7 +60,7 @@ def compare_in_motion(
         block, about, Reference(sim), align_motion(block, sim, names)
     )
     standing = found.posterior.probable_causes()
-    wide, _ = found.inferred.search.with_typical_calibration(found.set)
+    wide, _ = with_typical_calibration(found.inferred.fit.dictionary, found.set)
     state = _with_sizes(found, wide)
     free = _with_sizes(found, free_calibration_sizes(found, wide))
     every = (

@@ -22,6 +22,7 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import Alignment, MotionRows
 from fieldcal.model.rows.response import Response
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
@@ -72,9 +73,10 @@ class MotionFit:
 
     def search(self, members: Sequence[Member]) -> InferenceResult:
         """Search for the best set of causes, beginning with some."""
-        found = Inference(self.system, self.nominal).run(members or None)
+        fit = GaussNewton(self.system, self.nominal)
+        found = Inference(fit).run(members or None)
         # a search for effects first has columns of its own
-        system = found.inference.system
+        system = found.fit.system
         if isinstance(system, MotionSystem):
             self.system = system
         return found
@@ -88,7 +90,7 @@ class MotionFit:
 
     def evidence(self, members: tuple[Member, ...]) -> float:
         """Ln evidence of causes after `settle`, including that of the noise."""
-        fit = Inference(self.system, self.nominal)
+        fit = GaussNewton(self.system, self.nominal)
         members = fit.dictionary.match_members(members)
         *_, found = fit.settle(self.nominal, np.zeros(fit.dictionary.width), members)
         frequency, power = self.rows.frequency, self.system.power
@@ -98,7 +100,7 @@ class MotionFit:
     def settle(self, members: tuple[Member, ...]) -> None:
         """Fit some causes, the alignment and the noise in turn until convergence."""
         for _ in range(SETTLED):
-            fit = Inference(self.system, self.nominal)
+            fit = GaussNewton(self.system, self.nominal)
             members = fit.dictionary.match_members(members)
             none: Array = np.zeros(fit.dictionary.width)
             state, values, found = fit.settle(self.nominal, none, members)

@@ -18,10 +18,9 @@ from fieldcal.against.motion.following import MotionExplanation
 from fieldcal.against.prediction import chi2_of_uncertain_prediction
 from fieldcal.against.result import SimulatorPrediction
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.posterior.held_out import candidate_sets
 from fieldcal.model.rows.motion import MotionRows, frequencies
-from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
@@ -73,10 +72,10 @@ def _as_simulated(found: MotionExplanation) -> SimulatorPrediction:
 
 def _as_explained(found: MotionExplanation) -> SimulatorPrediction:
     inferred, system = found.inferred, found.fit.system
-    visited = list(inferred.search.visited.values())
-    sets = candidate_sets(inferred.best, visited)
-    d, values = system.dictionary, inferred.inference.pad(inferred.values)
-    wanted = inferred.inference.wanted_columns([m for s in sets for m in s.members])
+    visited = list(inferred.search.sets.visited.values())
+    candidates = candidate_sets(inferred.best, visited)
+    d, values = system.dictionary, inferred.fit.pad(inferred.values)
+    wanted = inferred.fit.wanted_columns([m for s in candidates for m in s.members])
     linear = system.linearised(inferred.state, wanted | (values != 0))
     rows, fold, hz = found.rows, _folds(found), found.fit.hz
     squares, count, off = 0.0, 0, _ResidualSquares()
@@ -85,8 +84,10 @@ def _as_explained(found: MotionExplanation) -> SimulatorPrediction:
         rest = [_of_stretches(part, rows, kept) for part in linear]
         frequency = frequencies(len(kept) * rows.length, rows.length, rows.step)
         for _ in range(ROUNDS):
-            search = Search(d, gram(rest, d, values, (), np.flatnonzero(wanted)))
-            best = max((search.evaluate(s.members, s.sizes) for s in sets), key=_score)
+            sets = Sets(d, gram(rest, d, values, (), np.flatnonzero(wanted)))
+            best = max(
+                (sets.evaluate(c.members, c.sizes) for c in candidates), key=_score
+            )
             levels = noise_levels(found.fit.bands, frequency, rest, values, best.state)
             rest = [_reweighted(found, p, levels, frequency) for p in rest]
         frequency = frequencies(len(gone) * rows.length, rows.length, rows.step)

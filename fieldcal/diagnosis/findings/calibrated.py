@@ -42,16 +42,16 @@ def calibration_groups(explanation: Explanation) -> dict[str, CalibrationGroup]:
 
 
 def calibration_of_set(
-    explanation: Explanation, one: Set
+    explanation: Explanation, fitted: Set
 ) -> dict[str, tuple[float, float, float]]:
     """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
-    found = one  # the best set has its reported sizes already
-    if one is not explanation.best.set:
-        found = average_over_sizes(explanation.posterior.search, one)
+    reported = fitted  # the best set has its reported sizes already
+    if fitted is not explanation.best.set:
+        reported = average_over_sizes(explanation.posterior.sets, fitted)
     at = _calibration_columns(explanation)
     left = explanation.dictionary.unfitted
     return _values_by_name(
-        explanation, at, *average_of_columns([(found, 1.0)], at, left)
+        explanation, at, *average_of_columns([(reported, 1.0)], at, left)
     )
 
 
@@ -76,7 +76,7 @@ def _values_by_name(
     explanation: Explanation, at: Index, mean: Array, covariance: Array
 ) -> dict[str, tuple[float, float, float]]:
     """Value, sigma and scale factor of columns of the calibration, by full name."""
-    d, nominal = explanation.dictionary, explanation.inferred.inference.nominal
+    d, nominal = explanation.dictionary, explanation.inferred.fit.nominal
     sigma, out = np.sqrt(np.diag(covariance)), {}
     for column, change, error in zip(at, mean, sigma, strict=True):
         first, base, kind = (
@@ -110,9 +110,9 @@ def calibration_changes(explanation: Explanation, less: Set) -> dict[str, Quanti
     now, before = (
         calibration_of_set(explanation, s) for s in (explanation.best.set, less)
     )
-    told, out = averaged_calibration(explanation), {}
+    averaged, out = averaged_calibration(explanation), {}
     for name, (value, _, size) in now.items():
-        sigma = told[name][1]
+        sigma = averaged[name][1]
         group = name.partition(".")[0]
         allowed = thresholds.USEFUL[group] * size
         was, sigma_was, _ = before.get(name, (np.nan, np.inf, 1.0))

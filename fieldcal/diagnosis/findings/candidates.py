@@ -29,10 +29,10 @@ def tried_candidates(
 ) -> tuple[Candidate, ...]:
     """Every effect that was tried on the rows, by decreasing fall of chi squared."""
     posterior = explanation.posterior
-    search, best = posterior.search, posterior.best
-    nothing = search.evaluate(())
-    alone = _best_offer_by_effect(search.offers(nothing))
-    beside = _best_offer_by_effect(search.offers(best))
+    offers, best = posterior.search.offers, posterior.best
+    nothing = posterior.sets.evaluate(())
+    alone = _best_offer_by_effect(offers.ranked(nothing))
+    beside = _best_offer_by_effect(offers.ranked(best))
     taken = {f.id: f for f in found}
     rows = int(explanation.rows.used.sum())
     losers = (i for i in alone if i in catalogue() and i not in taken)
@@ -45,11 +45,15 @@ def tried_candidates(
         offer = alone.get(id_)
         delta = 2 * _evidence_rise(offer, nothing) if offer else 0.0
         width = len(offer.member[1].columns) if offer else 0
-        one = taken.get(id_)
-        why = "" if one else _reason_rejected(id_, explanation, offer, beside.get(id_))
-        gain = one.evidence.get("held_out_gain", np.nan) if one else np.nan
-        if one is None and offer is not None and id_ in followed:
-            gain = _held_out_gain_alone(explanation, search.accept(nothing, offer))
+        accepted = taken.get(id_)
+        why = (
+            ""
+            if accepted
+            else _reason_rejected(id_, explanation, offer, beside.get(id_))
+        )
+        gain = accepted.evidence.get("held_out_gain", np.nan) if accepted else np.nan
+        if accepted is None and offer is not None and id_ in followed:
+            gain = _held_out_gain_alone(explanation, offers.accept(nothing, offer))
             if gain < 0:
                 why = f"what it was not fitted to it predicts worse; {why}"
         out.append(
@@ -59,19 +63,19 @@ def tried_candidates(
                 delta - width * float(np.log(rows)),
                 gain,
                 posterior.probability([id_]),
-                one is not None,
+                accepted is not None,
                 why,
             )
         )
     return tuple(sorted(out, key=lambda c: -c.delta_chi2))
 
 
-def _held_out_gain_alone(explanation: Explanation, there: Set) -> float:
+def _held_out_gain_alone(explanation: Explanation, candidate: Set) -> float:
     """Part of the held-out rms that a set removes, in the channel that changes most."""
-    best, nothing = explanation.best, explanation.posterior.search.evaluate(())
-    before = rms_over_parts(best.rows, explanation.held_out.residual([nothing]))
+    best, empty = explanation.best, explanation.posterior.sets.evaluate(())
+    before = rms_over_parts(best.rows, explanation.held_out.residual([empty]))
     after = rms_over_parts(
-        best.rows, held_out_residuals(replace(best, set=there), [there])
+        best.rows, held_out_residuals(replace(best, set=candidate), [candidate])
     )
     known = np.isfinite(before) & np.isfinite(after) & (before > 0)
     if not known.any():
@@ -89,11 +93,11 @@ def _best_offer_by_effect(offers: Sequence[Offer]) -> Mapping[str, Offer]:
     return found
 
 
-def _evidence_rise(offer: Offer, there: Set) -> float:
+def _evidence_rise(offer: Offer, without: Set) -> float:
     """Rise of ln Z with a cause, without its prior probability; 0 at least."""
     cause = offer.member[0]
     chance = np.log(cause.chance / len(cause.variants))
-    return max(offer.score - there.score - float(chance), 0.0)
+    return max(offer.score - without.score - float(chance), 0.0)
 
 
 def _reason_rejected(
@@ -108,10 +112,10 @@ def _reason_rejected(
                 f"explains it about as well as {standing.name}; this recording cannot"
                 " tell"
             )
-    rise = _evidence_rise(alone, posterior.search.evaluate(())) if alone else 0.0
+    rise = _evidence_rise(alone, posterior.sets.evaluate(())) if alone else 0.0
     if rise < thresholds.LITTLE_LOG_GAIN or alone is None:
         return "explains no more than chance would"
-    odds = _odds(alone.score - posterior.search.evaluate(()).score)
+    odds = _odds(alone.score - posterior.sets.evaluate(()).score)
     if not best.members:
         return f"takes a little: its odds are {odds}"
     if beside is not None and _evidence_rise(beside, best) > thresholds.LITTLE_LOG_GAIN:

@@ -30,10 +30,13 @@ def covariate_functions(name: str, x: Experience, channel: int) -> Mapping[str, 
         names = [f"f_{a}" for a in "xyz"]
         forces = dict(zip(names, x.f.T, strict=True))
         return {f"{n}^{k}": f**k for n, f in forces.items() for k in (1, 2, 3, 4)}
-    one, two = _angle_functions("alpha", x.alpha), _angle_functions("beta", x.beta)
+    of_alpha, of_beta = (
+        _angle_functions("alpha", x.alpha),
+        _angle_functions("beta", x.beta),
+    )
     if name == "joints":
-        return {f"{a}*{b}": one[a] * two[b] for a in one for b in two}
-    return one if name == "alpha" else two
+        return {f"{a}*{b}": of_alpha[a] * of_beta[b] for a in of_alpha for b in of_beta}
+    return of_alpha if name == "alpha" else of_beta
 
 
 def _angle_functions(name: str, angle: Array) -> dict[str, Array]:

@@ -31,10 +31,12 @@ def found_filters(explanation: Explanation) -> Iterator[FoundEffect]:
     probability = float(probability_of_log_odds(odds))
     state = explanation.best.set.state
     at = [int(np.flatnonzero(state.columns == c)[0]) for c in group.columns[:2]]
-    found = time_constants(state.estimate[at], np.sqrt(np.diag(state.inverse)[at]))
-    if probability >= thresholds.NAMED and found:
+    constants = time_constants(state.estimate[at], np.sqrt(np.diag(state.inverse)[at]))
+    if probability >= thresholds.NAMED and constants:
         evidence = {"log_evidence": rise}
-        yield FoundEffect(FILTERED, found, evidence=evidence, probability=probability)
+        yield FoundEffect(
+            FILTERED, constants, evidence=evidence, probability=probability
+        )
 
 
 def time_constants(square: Array, sigma: Array) -> dict[str, Quantity]:

@@ -63,10 +63,10 @@ def remove_cause(explanation: Explanation, standing: ProbableCause) -> CauseRemo
     """Remove a cause, and calculate what its columns had explained."""
     best = explanation.best
     less = explanation.posterior.without(standing.name)
-    there = FittedSet(best.rows, best.dictionary, best.linear, best.values, less)
-    residual = there.residual(there.deterministic_estimate)
+    reduced = FittedSet(best.rows, best.dictionary, best.linear, best.values, less)
+    residual = reduced.residual(reduced.deterministic_estimate)
     now = best.squares_of(best.residual(best.deterministic_estimate))
-    turned = _squares_of_turns(explanation, there) - _squares_of_turns(
+    turned = _squares_of_turns(explanation, reduced) - _squares_of_turns(
         explanation, best
     )
     return CauseRemoval(less, residual, best.squares_of(residual) - now, turned)
@@ -142,9 +142,9 @@ def parameter_estimates(
         known = [m for m in standing.members if shape.name in m[1].shape]
         if shape.kind == "instant":
             known = known[:1]  # estimated from all channels together
-        found = [shape_estimate(explanation, m) for m in known]
-        weight = np.array([1 / max(error, 1e-12) ** 2 for _, error in found])
-        at = float(weight @ [at for at, _ in found] / weight.sum())
+        shapes = [shape_estimate(explanation, m) for m in known]
+        weight = np.array([1 / max(error, 1e-12) ** 2 for _, error in shapes])
+        at = float(weight @ [at for at, _ in shapes] / weight.sum())
         out[shape.name] = Quantity(at, float(weight.sum() ** -0.5), shape.unit)
     return out
 
@@ -214,11 +214,11 @@ def shape_estimate(explanation: Explanation, member: Member) -> tuple[float, flo
     return value, min(group.shape_sigma, value)
 
 
-def column_estimates(found: Set, columns: Index) -> tuple[Array, Array, Array]:
+def column_estimates(fitted: Set, columns: Index) -> tuple[Array, Array, Array]:
     """Value, sigma and prior standard deviation of some columns of a set."""
-    at = found.state.places_of(columns)
-    value, sigma = found.state.estimate[at], np.sqrt(np.diag(found.state.inverse)[at])
-    return value, sigma, found.state.prior_sigma[at]
+    at = fitted.state.places_of(columns)
+    value, sigma = fitted.state.estimate[at], np.sqrt(np.diag(fitted.state.inverse)[at])
+    return value, sigma, fitted.state.prior_sigma[at]
 
 
 def _held_out_gain(
@@ -234,8 +234,8 @@ def _held_out_gain(
     """
     if not isinstance(catalogue()[standing.name], Scatter):
         return held_out_rms_gain(explanation, lost, then)
-    held_out, there = explanation.held_out, explanation.best.set
-    rise = held_out.density(there) - held_out.density(lost.set)
+    held_out, best = explanation.held_out, explanation.best.set
+    rise = held_out.density(best) - held_out.density(lost.set)
     channels = [c for _, g in standing.members for c in _scattered_channels(g)]
     rows = int(explanation.rows.used[:, np.unique(channels)].sum())
     return float(1 - np.exp(-rise / rows))
@@ -253,9 +253,9 @@ def held_out_rms_gain(
 ) -> float:
     """Part of the held-out rms that is removed, in the channel with the most effect."""
     best, turned = explanation.best, explanation.inferred.turn_rows
-    there = FittedSet(best.rows, best.dictionary, best.linear, best.values, lost.set)
+    reduced = FittedSet(best.rows, best.dictionary, best.linear, best.values, lost.set)
     if shows_mainly_in_turns(lost):
-        without = root_mean_square(held_out_turn_residuals(there, turned))
+        without = root_mean_square(held_out_turn_residuals(reduced, turned))
         return float(1 - root_mean_square(explanation.turns_held_out) / without)
     ahead = rms_over_parts(best.rows, explanation.held_out.residual([lost.set]))
     now = then.held_out_rms

@@ -34,8 +34,8 @@ def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, f
     known = _fitted_changes(explanation, member)
     plain = rows.y - explanation.best.residual() - _change_of_outputs(rows.x, known)
     change = _change_of_outputs(rows.x, known, dict.fromkeys(group.shape, -np.inf))
-    seen = np.where(rows.used, rows.y - plain, np.nan)
-    low, high = _possible_instants(explanation, _squares(seen, change, rows.sd), at)
+    residual = np.where(rows.used, rows.y - plain, np.nan)
+    low, high = _possible_instants(explanation, _squares(residual, change, rows.sd), at)
     part = slice(*np.searchsorted(block.t, [low, np.nextafter(high, np.inf)]))
     t, six = block.t[part], block.six[part]
     row = np.clip(np.searchsorted(rows.span[:, 1], t), 0, len(rows.x.t) - 1)
@@ -72,10 +72,13 @@ def _possible_instants(
     """First and last possible instant of the change, s, by S before each row."""
     span = explanation.rows.span
     near = int(np.searchsorted(explanation.rows.x.t, at))
-    some = np.append(
+    instants = np.append(
         np.flatnonzero(squares < squares.min() + thresholds.IN_CHANNEL), near
     )
-    first, last = max(int(some.min()) - 1, 0), min(int(some.max()), len(span) - 1)
+    first, last = (
+        max(int(instants.min()) - 1, 0),
+        min(int(instants.max()), len(span) - 1),
+    )
     return float(span[first, 0]), float(span[last, 1])
 
 

@@ -116,12 +116,14 @@ def _of_turns(
         way = turn.way_design[:, at] @ values[turn.columns[at]]
         squares[i] = float(turn.info @ off**2) + float(way @ way)
     out = squares > max(thresholds.STANDS_OUT**2, 0.05 * squares.max())
-    some = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
-    places = tuple(sorted({p for t in some for p in t.positions}))
+    contributing = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
+    places = tuple(sorted({p for t in contributing for p in t.positions}))
     source = explanation.prepared.source
     windows = window_bounds(source.block, source.about)
     t = source.block.t
-    gaps = [(windows[p, 1], windows[q, 0]) for p, q in (s.positions for s in some)]
+    gaps = [
+        (windows[p, 1], windows[q, 0]) for p, q in (s.positions for s in contributing)
+    ]
     effect = catalogue()[standing.name]
     delta = 2 * (explanation.posterior.best.state.score - lost.set.state.score)
     for channel, size in largest_turn_outputs(explanation, standing).items():
@@ -141,10 +143,10 @@ def largest_turn_outputs(
     explanation: Explanation, standing: ProbableCause
 ) -> dict[str, float]:
     """Largest output that a cause makes in turns, by channel, rms of the worst turn."""
-    inference = explanation.inferred.inference
+    fit = explanation.inferred.fit
     out: dict[str, float] = {}
     state, members = explanation.state, standing.members
-    for course in inference.outputs_in_turns(explanation.turns, state, members):
+    for course in fit.outputs_in_turns(explanation.turns, state, members):
         for c, name in enumerate(CHANNELS):
             size = float(np.sqrt(np.mean(course[:, c] ** 2)))
             out[name] = max(out.get(name, 0.0), size)
@@ -183,8 +185,8 @@ def _of_group(
         covariate, correlation, share = best_correlate(
             explanation, cause, c, lost.residual
         )
-        one = _in_windows(explanation, lost, c, positions, kind, covariate)
-        yield replace(one, correlation=correlation, share=share)
+        mismatch = _in_windows(explanation, lost, c, positions, kind, covariate)
+        yield replace(mismatch, correlation=correlation, share=share)
 
 
 KINDS: dict[str, Kind] = {
@@ -212,9 +214,9 @@ def best_correlate(
     for label, course in covariate_functions(name, x, channel).items():
         spread = course[known].std()
         if spread > 1e-9:
-            one = float(np.corrcoef(course[known], off[known])[0, 1])
-            if not np.isfinite(correlation) or abs(one) > abs(correlation):
-                best, correlation = label, one
+            coefficient = float(np.corrcoef(course[known], off[known])[0, 1])
+            if not np.isfinite(correlation) or abs(coefficient) > abs(correlation):
+                best, correlation = label, coefficient
     after = explanation.best.residual()[:, channel]
     sd = explanation.rows.sd[:, channel]
     noise = float(known.sum())

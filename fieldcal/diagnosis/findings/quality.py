@@ -14,7 +14,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import (
     Explanation,
-    build_inference,
+    build_fit,
     fit_calibration_only,
 )
 from fieldcal.diagnosis.findings.agreement import ModelResiduals
@@ -75,7 +75,7 @@ def explained_residuals(explanation: Explanation) -> ModelResiduals:
 def turn_quality(explanation: Explanation) -> tuple[Quality, Quality]:
     """Quality in the turns without and with the effects, in standard deviations."""
     best, turned = explanation.best, explanation.inferred.turn_rows
-    nothing = explanation.posterior.search.evaluate(())
+    nothing = explanation.posterior.sets.evaluate(())
     plain = replace(best, set=nothing)
     return (
         _quality_of_turns(plain, turned, held_out_turn_residuals(plain, turned)),
@@ -105,7 +105,7 @@ def fit_recorded_samples(block: Block, explanation: Explanation) -> FittedSet:
     # rows of the same kind as before: by-hand or not is not decided again
     in_hand = prepared.rows.hand_angle.any()
     rows = rows_of_recording(source) if in_hand else reduce_to_rows(source)
-    return fit_calibration_only(build_inference(source, rows, prepared), rows)
+    return fit_calibration_only(build_fit(source, rows, prepared), rows)
 
 
 def most_different_triad(one: ModelResiduals, other: ModelResiduals) -> int:
@@ -120,7 +120,7 @@ def most_different_triad(one: ModelResiduals, other: ModelResiduals) -> int:
             (one.rms_with_lines, other.rms_with_lines),
             (one.held_out_rms, other.held_out_rms),
         ):
-            first, then = (np.nan_to_num(some[part]) for some in pair)
+            first, then = (np.nan_to_num(rms[part]) for rms in pair)
             gain = float((first**2 - then**2).max())
             gains.append(gain / max(float(then.max()) ** 2, 1e-300))
         sizes.append(max(gains))

@@ -37,19 +37,19 @@ def random_sizes(
 
 
 def random_sizes_of_group(
-    found: Set, d: Dictionary, group: Group, v: float
+    fitted: Set, d: Dictionary, group: Group, v: float
 ) -> dict[str, Quantity]:
     """Sizes of a random group, axis by axis, given that its size in a set is v.
 
     Their uncertainty follows from the information on ln v.
     """
     out = {}
-    whole = most_probable_size(found.state, found.state.places_of(group.columns), v)
+    whole = most_probable_size(fitted.state, fitted.state.places_of(group.columns), v)
     for param, at in _scattered_columns(d, group):
         size, part = whole
         if len(at) < len(group.columns):
             size, part = most_probable_axis_size(
-                found.state, found.state.places_of(at), v, whole
+                fitted.state, fitted.state.places_of(at), v, whole
             )
         size *= param.typical
         out[param.name] = Quantity(size, size * part, param.unit)

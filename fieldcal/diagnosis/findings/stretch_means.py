@@ -31,9 +31,11 @@ def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.in
             use = np.isfinite(residual[part]) & rows.used[part]
             weight = np.where(use, 1 / np.where(use, rows.sd[part], 1.0) ** 2, 0.0)
             total = weight.sum(axis=0)
-            some = np.where(total > 0, total, np.nan)
-            means.append((weight * np.nan_to_num(residual[part])).sum(axis=0) / some)
-            sds.append(np.hypot(1 / np.sqrt(some), rows.window_error[part[0]]))
+            information = np.where(total > 0, total, np.nan)
+            means.append(
+                (weight * np.nan_to_num(residual[part])).sum(axis=0) / information
+            )
+            sds.append(np.hypot(1 / np.sqrt(information), rows.window_error[part[0]]))
             position.append(p)
     return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
 

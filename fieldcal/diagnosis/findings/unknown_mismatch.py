@@ -80,9 +80,9 @@ def angle_errors(
     if standing.kind != "position":
         return {}
     return {
-        one.moved_positions or (one.position,): _errors(explanation, one)
+        error.moved_positions or (error.position,): _errors(explanation, error)
         for member in standing.members
-        for one in single_errors(explanation, member)
+        for error in single_errors(explanation, member)
     }
 
 
@@ -105,9 +105,9 @@ def exchanged_positions(
     ]
 
 
-def _is_at(held: Array, there: Array, stated: Array) -> bool:
+def _is_at(held: Array, elsewhere: Array, stated: Array) -> bool:
     """Whether angles are those stated elsewhere, and not those stated, rad."""
-    off, apart = wrap_angle(held - there), wrap_angle(held - stated)
+    off, apart = wrap_angle(held - elsewhere), wrap_angle(held - stated)
     return bool(np.abs(off).max() < EXCHANGED_WITHIN * np.abs(apart).max())
 
 
@@ -117,7 +117,7 @@ def single_errors(explanation: Explanation, member: Member) -> list[Group]:
     parts = [*cause.single_errors_of(group)]
     if len(parts) == 1:
         return parts  # it may be an error other than of an angle
-    return [one for one in parts if _errors(explanation, one)] or parts
+    return [part for part in parts if _errors(explanation, part)] or parts
 
 
 def _errors(explanation: Explanation, group: Group) -> AngleErrors:
@@ -137,5 +137,5 @@ def list_positions(positions: Sequence[int], most: int | None = None) -> str:
     ('position 4', 'positions 1, 2…')
     """
     word = "position" if len(positions) == 1 else "positions"
-    some = ", ".join(str(index + 1) for index in positions[:most])
-    return f"{word} {some}" + "…" * (most is not None and len(positions) > most)
+    listed = ", ".join(str(index + 1) for index in positions[:most])
+    return f"{word} {listed}" + "…" * (most is not None and len(positions) > most)

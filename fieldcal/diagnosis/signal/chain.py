@@ -63,8 +63,8 @@ class CheckedRecording:
     @property
     def clock_pace(self) -> float:
         """Seconds of the device's clock per true second."""
-        found = [f.values["ppm"] for i, f in self.faults if i == "clock_skew"]
-        return 1 + 1e-6 * float(found[0]) if found else 1.0
+        skews = [f.values["ppm"] for i, f in self.faults if i == "clock_skew"]
+        return 1 + 1e-6 * float(skews[0]) if skews else 1.0
 
 
 def check_chain(block: Block, about: Description) -> CheckedRecording:
@@ -83,8 +83,8 @@ def check_chain(block: Block, about: Description) -> CheckedRecording:
     block, samples = _correct(block, usable, about, faults)
     for name in _ids_by_treatment("mask"):
         before = len(faults)
-        found = _find(name, samples)
-        for fault in _off_rails(found, samples) if name == "stuck" else found:
+        new_faults = _find(name, samples)
+        for fault in _off_rails(new_faults, samples) if name == "stuck" else new_faults:
             if name == "saturation" and _is_stuck(fault, faults):
                 continue
             faults.append((name, fault))
@@ -143,8 +143,8 @@ def recheck_without_lines(
 def _ids_by_treatment(treatment: str) -> list[str]:
     """Ids of the effects on samples with one treatment, in their order."""
     chain = [e for e in catalogue().values() if isinstance(e, Chain)]
-    some = [e for e in chain if e.treatment == treatment]
-    return [e.id for e in sorted(some, key=lambda e: (e.place, e.id))]
+    treated = [e for e in chain if e.treatment == treatment]
+    return [e.id for e in sorted(treated, key=lambda e: (e.place, e.id))]
 
 
 def _find(name: str, samples: CheckedSamples) -> list[Fault]:
@@ -179,19 +179,19 @@ def _mark_unusable(
                 usable[first:last, c] = False
 
 
-def _off_rails(found: list[Fault], samples: CheckedSamples) -> list[Fault]:
+def _off_rails(faults: list[Fault], samples: CheckedSamples) -> list[Fault]:
     """Runs of equal values without those at a limit to which a channel returns.
 
     A stuck channel stops once and anywhere; a clipped one always stops at its limit.
     """
-    if not found:
-        return found
+    if not faults:
+        return faults
     rails = {f.channel: f.rows for f in _find("saturation", samples)}
-    clipped = [bool(np.isin(f.rows, rails.get(f.channel, ())).all()) for f in found]
-    often = Counter(f.channel for f, c in zip(found, clipped, strict=True) if c)
+    clipped = [bool(np.isin(f.rows, rails.get(f.channel, ())).all()) for f in faults]
+    often = Counter(f.channel for f, c in zip(faults, clipped, strict=True) if c)
     return [
         f
-        for f, c in zip(found, clipped, strict=True)
+        for f, c in zip(faults, clipped, strict=True)
         if not (c and often[f.channel] > 1)
     ]
 

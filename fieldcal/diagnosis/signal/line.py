@@ -110,9 +110,9 @@ def line_remainder(pieces: WindowSamples, tone: SpectralLine) -> LineRemainder:
     moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES_PER_WINDOW)
     groups = np.arange(len(moments.counts))
     fold = groups % (MAX_FOLDS if many else STRETCHES_PER_WINDOW)
-    seen = moments.amplitudes(np.zeros(1))[0]
+    measured = moments.amplitudes(np.zeros(1))[0]
     fitted = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[moments.window]
-    ahead = seen.copy()
+    ahead = measured.copy()
     span = max(float(np.ptp(moments.middle)), 1 / tone.hz)
     for i in np.unique(fold):
         rest = moments.select(fold != i)
@@ -122,13 +122,13 @@ def line_remainder(pieces: WindowSamples, tone: SpectralLine) -> LineRemainder:
         )
         # a wave at a slightly different frequency rotates against that at tone.hz
         left = moments.select(fold == i)
-        told = (tone.effect.response(pieces.x, near.hz) @ near.causes)[left.window]
-        ahead[fold == i] -= told * _mean_rotation(left, near.hz - tone.hz)
+        predicted = (tone.effect.response(pieces.x, near.hz) @ near.causes)[left.window]
+        ahead[fold == i] -= predicted * _mean_rotation(left, near.hz - tone.hz)
     noise = np.where(np.nan_to_num(pieces.noise) > 0, pieces.noise, np.inf)
-    fallen = np.abs(seen) ** 2 - np.abs(ahead) ** 2
+    fallen = np.abs(measured) ** 2 - np.abs(ahead) ** 2
     return LineRemainder(
-        _mean_square(seen),
-        _mean_square(seen - fitted),
+        _mean_square(measured),
+        _mean_square(measured - fitted),
         _mean_square(ahead),
         moments.counts / 2 @ fallen / noise**2,
     )
@@ -188,7 +188,7 @@ def _fit_causes(
 
     """
     count, size = len(offset), 6 * len(moments.counts)
-    seen = moments.amplitudes(offset).reshape(count, size, 1)
+    measured = moments.amplitudes(offset).reshape(count, size, 1)
     each = [effect.response(pieces.x, hz) for hz in moments.near + offset]
     response = np.array(each)[:, moments.window].reshape(count, size, -1)
     # a channel that never changes has no weight
@@ -199,13 +199,13 @@ def _fit_causes(
     normal = weighted @ response
     trace = np.trace(normal, axis1=1, axis2=2).real[:, None, None]
     normal += 1e-12 * trace * np.eye(normal.shape[-1])
-    causes = np.linalg.solve(normal, weighted @ seen)[..., 0]
+    causes = np.linalg.solve(normal, weighted @ measured)[..., 0]
     own = np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2)
     sigma = np.sqrt(own.real)
     if effect.kind == "sensor":  # each output has its own cause: drop those at noise
         causes = np.where(np.abs(causes) > thresholds.LINE_SIGMAS * sigma, causes, 0.0)
-    left = seen - response @ causes[..., None]
-    fallen = np.abs(seen) ** 2 - np.abs(left) ** 2
+    left = measured - response @ causes[..., None]
+    fallen = np.abs(measured) ** 2 - np.abs(left) ** 2
     return causes, sigma, fallen[..., 0] @ weight
 
 
@@ -248,10 +248,10 @@ def _named_amplitudes(
     """Amplitudes by name: one for each cause, or one for all of them."""
     names = [p.name for p in effect.params]
     if len(names) == len(causes):
-        some = np.flatnonzero(causes)
+        nonzero = np.flatnonzero(causes)
         return (
-            {names[i]: float(abs(causes[i])) for i in some},
-            {names[i]: float(sigma[i]) for i in some},
+            {names[i]: float(abs(causes[i])) for i in nonzero},
+            {names[i]: float(sigma[i]) for i in nonzero},
         )
     size = float(np.linalg.norm(causes))
     share = np.abs(causes) / max(size, 1e-300)

@@ -91,8 +91,8 @@ def _significant(
     rejected: Sequence[Peak] = (),
 ) -> Peak | None:
     """The most significant peak of some spectra, None if chance may have made it."""
-    found = [_highest_in_spectrum(s, low, reach, taken, rejected) for s in spectra]
-    odds, peak = min(filter(None, found), key=itemgetter(0), default=(0.0, None))
+    highest = [_highest_in_spectrum(s, low, reach, taken, rejected) for s in spectra]
+    odds, peak = min(filter(None, highest), key=itemgetter(0), default=(0.0, None))
     return peak if odds < np.log(thresholds.LINE_BY_CHANCE) else None
 
 
@@ -129,18 +129,18 @@ def _highest_in_spectrum(
     hz = spectrum.hz[band]
     stands = {c: spectrum.power_over_noise(c, band) for c in spectrum.channels}
     best: tuple[float, Peak] | None = None
-    for some in spectrum.channel_groups:
-        there = [*taken, *(p for p in rejected if set(p.channels) & set(some))]
-        free = _away_from(hz, there, reach)
+    for channels in spectrum.channel_groups:
+        occupied = [*taken, *(p for p in rejected if set(p.channels) & set(channels))]
+        free = _away_from(hz, occupied, reach)
         if free.sum() < 4 * FLOOR_NEIGHBOURS:
             continue
-        total = np.sum([stands[c] for c in some], axis=0)
+        total = np.sum([stands[c] for c in channels], axis=0)
         at = int(np.argmax(np.where(free, total, 0.0)))
-        odds = _log_gamma_tail(float(total[at]), count * len(some))
+        odds = _log_gamma_tail(float(total[at]), count * len(channels))
         odds += np.log(SEARCHED_GROUPS * len(total))
         if best is None or odds < best[0]:
-            peak = _peak_at(hz, total / (count * len(some)), at)
-            best = odds, replace(peak, channels=some)
+            peak = _peak_at(hz, total / (count * len(channels)), at)
+            best = odds, replace(peak, channels=channels)
     return best
 
 

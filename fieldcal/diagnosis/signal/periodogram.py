@@ -147,7 +147,11 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
         frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
-    triads = [some for some in CHANNEL_GROUPS if set(some) <= set(windows.channels)]
+    triads = [
+        channels
+        for channels in CHANNEL_GROUPS
+        if set(channels) <= set(windows.channels)
+    ]
     # electronics may disturb one output alone, motion of the base disturbs a triad
     groups = [(*windows.channel_groups, *triads), tuple(triads)]
     variance = _neighbour_variance(windows, pieces)
@@ -196,9 +200,9 @@ def _neighbour_variance(windows: Spectrum, pieces: WindowSamples) -> Array:
     )
     kernel = np.ones(2 * reach + 1)
     kernel[reach - close : reach + close + 1] = 0.0
-    there = np.convolve(np.ones(size), kernel)[reach:-reach]
+    neighbours = np.convolve(np.ones(size), kernel)[reach:-reach]
     total = [np.convolve(row, kernel)[reach:-reach] for row in windows.power]
-    out: Array = np.array(total) / np.maximum(there, 1.0) / count
+    out: Array = np.array(total) / np.maximum(neighbours, 1.0) / count
     return out
 
 

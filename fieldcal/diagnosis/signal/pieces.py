@@ -101,14 +101,14 @@ def experience_in_windows(
     rows: Rows, held: Sequence[tuple[int, int, int]]
 ) -> Experience:
     """Orientation and forces in the windows of `long_windows`."""
-    x, some = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
+    x, row_numbers = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
     return Experience.at_rest(
-        x.alpha[some],
-        x.beta[some],
+        x.alpha[row_numbers],
+        x.beta[row_numbers],
         x.gravity,
-        f=x.f[some],
+        f=x.f[row_numbers],
         mounting=x.mounting,
-        gamma=x.gamma[some],
+        gamma=x.gamma[row_numbers],
     )
 
 
@@ -139,15 +139,15 @@ def _detrended(
 def evaluate_line(t: Array, hz: float, amplitude: Complex) -> Array:
     """Samples of a line, Re(amplitude exp(2 pi i hz t)), (n, c)."""
     turned = 2 * np.pi * hz * t
-    both = np.array([amplitude.real, -amplitude.imag])
-    line: Array = np.column_stack([np.cos(turned), np.sin(turned)]) @ both
+    amplitudes = np.array([amplitude.real, -amplitude.imag])
+    line: Array = np.column_stack([np.cos(turned), np.sin(turned)]) @ amplitudes
     return line
 
 
 def subtract_line(values: Array, t: Array, hz: float, amplitude: Complex) -> None:
     """Subtract a line from samples (n, c), in place."""
-    for some in chunks(0, len(t)):
-        values[some] -= evaluate_line(t[some], hz, amplitude)
+    for chunk in chunks(0, len(t)):
+        values[chunk] -= evaluate_line(t[chunk], hz, amplitude)
 
 
 def chunks(first: int, last: int) -> Iterator[slice]:

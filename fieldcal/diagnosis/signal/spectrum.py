@@ -88,15 +88,18 @@ def subtract_lines(
     for tone in found:
         response = tone.effect.response(x, tone.hz) @ tone.causes
         where = [
-            (slice(a, b), seen) for (_, a, b), seen in zip(held, response, strict=True)
+            (slice(a, b), in_window)
+            for (_, a, b), in_window in zip(held, response, strict=True)
         ]
         if tone.effect.kind == "sensor":
             where = [(slice(0, len(block)), response[0])]
         for i, own in enumerate((slice(0, 3), slice(3, 6))):
             if response[:, own].any():
                 triads[i] = triads[i].copy()
-                for span, seen in where:
-                    subtract_line(triads[i][span], block.t[span], tone.hz, seen[own])
+                for span, in_window in where:
+                    subtract_line(
+                        triads[i][span], block.t[span], tone.hz, in_window[own]
+                    )
     return replace(block, acc=triads[0], gyr=triads[1])
 
 
@@ -157,9 +160,9 @@ def _deviations_from_line(
     pieces: WindowSamples, tone: SpectralLine, moments: Moments
 ) -> tuple[Complex, Complex]:
     """Amplitudes of the windows, and their deviations from one steady line."""
-    seen = moments.amplitudes(np.array([tone.hz - moments.near]))[0]
+    measured = moments.amplitudes(np.array([tone.hz - moments.near]))[0]
     modelled = tone.effect.response(pieces.x, tone.hz) @ tone.causes
-    return seen, seen - modelled
+    return measured, measured - modelled
 
 
 def _scatter_between_windows(
@@ -191,14 +194,14 @@ def _in_both_halves(pieces: WindowSamples, tone: SpectralLine) -> bool:
     present in the first half only.
     """
     clear = tone.clear_channels
-    seen = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[:, clear]
+    response = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[:, clear]
     taken = np.zeros(2)
-    for s, t, one in zip(pieces.samples, pieces.times, seen, strict=True):
+    for s, t, one in zip(pieces.samples, pieces.times, response, strict=True):
         middle = -(-len(t) // 2)
         for half, ends in enumerate(((0, middle), (middle, len(t)))):
-            for some in chunks(*ends):
-                line = evaluate_line(t[some], tone.hz, one)
-                fallen = ((2 * s[some, clear] - line) * line).sum(axis=0)
+            for chunk in chunks(*ends):
+                line = evaluate_line(t[chunk], tone.hz, one)
+                fallen = ((2 * s[chunk, clear] - line) * line).sum(axis=0)
                 taken[half] += (fallen / pieces.noise[clear] ** 2).sum()
     # the part of E in one half has the standard deviation 2 sqrt(E / 2)
     sigma = 2 * np.sqrt(max(float(taken.sum()), 0.0) / 2)
@@ -215,9 +218,9 @@ def _coherent_part(
     base have as much energy there, but a different phase in each window.
     """
     clear = tone.clear_channels
-    seen, off = _deviations_from_line(pieces, tone, moments)
+    measured, off = _deviations_from_line(pieces, tone, moments)
     half = moments.counts[:, None] / 2
-    energy = (half * np.abs(seen[:, clear]) ** 2).sum(axis=0)
+    energy = (half * np.abs(measured[:, clear]) ** 2).sum(axis=0)
     left = (half * np.abs(off[:, clear]) ** 2).sum(axis=0)
     weight = 1 / pieces.noise[clear] ** 2
     noise = 2.0 * len(half) * len(clear)
@@ -227,5 +230,7 @@ def _coherent_part(
 def _subtract(pieces: WindowSamples, tone: SpectralLine) -> None:
     """Subtract a line from the samples, in place to save memory."""
     response = tone.effect.response(pieces.x, tone.hz) @ tone.causes
-    for samples, t, seen in zip(pieces.samples, pieces.times, response, strict=True):
-        subtract_line(samples, t, tone.hz, seen)
+    for samples, t, amplitudes in zip(
+        pieces.samples, pieces.times, response, strict=True
+    ):
+        subtract_line(samples, t, tone.hz, amplitudes)

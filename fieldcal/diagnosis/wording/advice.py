@@ -83,23 +83,24 @@ def _how_to_decide(
     explanation: Explanation, effects: Sequence[FoundEffect]
 ) -> Iterator[str]:
     """How to distinguish an effect from its aliases, one sentence for each way."""
-    for one in effects:
+    for effect in effects:
         ways: dict[str, list[str]] = {}
         open_ = []
-        for other in one.aliases:
-            place = deciding_position(explanation, one.id, other)
+        for other in effect.aliases:
+            place = deciding_position(explanation, effect.id, other)
             if place is None:
                 open_.append(other)
             else:
                 apart = f"{other} ({place.apart:.0f} σ apart there)"
                 ways.setdefault(place.text, []).append(apart)
         for way, others in ways.items():
-            told = join_words(others, "and")
-            yield f"{_capital(way)}: it distinguishes {one.id} from {told}."
+            alternatives = join_words(others, "and")
+            yield f"{_capital(way)}: it distinguishes {effect.id} from {alternatives}."
         if open_:
             yield (
-                f"{one.id} or {join_words(open_, 'or')}? {_none_in_reach(explanation)}"
-                f"{catalogue()[one.id].decided_by}."
+                f"{effect.id} or {join_words(open_, 'or')}?"
+                f" {_none_in_reach(explanation)}"
+                f"{catalogue()[effect.id].decided_by}."
             )
 
 
@@ -190,5 +191,5 @@ def _remedy(unknown: UnknownMismatch) -> tuple[str, str]:
     )
 
 
-def _deterministic(found: FoundEffect) -> bool:
-    return not isinstance(catalogue()[found.id], Scatter | Chain)
+def _deterministic(effect: FoundEffect) -> bool:
+    return not isinstance(catalogue()[effect.id], Scatter | Chain)

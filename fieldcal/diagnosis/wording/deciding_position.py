@@ -74,8 +74,8 @@ def deciding_position(
     best: DecidingPosition | None = None
     for alpha, beta in ladder_settings(about.positions):
         place = rows_at_session_end(x, *np.deg2rad([[alpha], [beta]]))
-        seen = [s.output(s.experienced(place), since) for s in states]
-        apart = float(np.nanmax(np.abs(seen[0] - seen[1]) / sd))
+        outputs = [s.output(s.experienced(place), since) for s in states]
+        apart = float(np.nanmax(np.abs(outputs[0] - outputs[1]) / sd))
         if best is None or apart > best.apart * 1.2:
             at = [i for i, angles in enumerate(held) if angles == (alpha, beta)]
             number = about.indices_in_file(at[:1])[0] + 1 if at else 0
@@ -83,7 +83,7 @@ def deciding_position(
     return best if best is not None and best.apart > thresholds.DECIDES else None
 
 
-def _state(explanation: Explanation, found: Set) -> State:
+def _state(explanation: Explanation, fitted: Set) -> State:
     """The state at a set's estimates, without errors of single orientations."""
-    state, _ = explanation.inferred.inference.state_at_estimate(found)
+    state, _ = explanation.inferred.fit.state_at_estimate(fitted)
     return replace(state, small_rotation=np.zeros_like(state.small_rotation))

@@ -32,33 +32,33 @@ def by_impact(effects: Iterable[FoundEffect]) -> list[FoundEffect]:
     return sorted(effects, key=_impact, reverse=True)
 
 
-def _impact(found: FoundEffect) -> tuple[int, float]:
+def _impact(finding: FoundEffect) -> tuple[int, float]:
     """Rank of what an effect does to the calibration, and by how many sigmas."""
-    effect = catalogue()[found.id]
+    effect = catalogue()[finding.id]
     if isinstance(effect, Chain | Line):
         return 0, 0.0
     if isinstance(effect, Scatter):
         return 1, 0.0
-    return 2, max(map(_significance, found.moves.values()), default=0.0)
+    return 2, max(map(_significance, finding.moves.values()), default=0.0)
 
 
 def effect_lines(effects: Sequence[FoundEffect]) -> tuple[EffectLine, ...]:
     """One line for each effect; of repeated ones, the largest."""
     alike: dict[str, list[FoundEffect]] = {}
-    for found in effects:
-        alike.setdefault(found.id, []).append(found)
-    return tuple(_line(name, found) for name, found in alike.items())
+    for effect in effects:
+        alike.setdefault(effect.id, []).append(effect)
+    return tuple(_line(name, same) for name, same in alike.items())
 
 
-def _line(name: str, found: Sequence[FoundEffect]) -> EffectLine:
+def _line(name: str, effects: Sequence[FoundEffect]) -> EffectLine:
     largest = max(
-        found, key=lambda f: max(map(_significance, f.parameters.values()), default=0)
+        effects, key=lambda f: max(map(_significance, f.parameters.values()), default=0)
     )
-    often = f" ({len(found)} times)" if len(found) > 1 else ""
+    often = f" ({len(effects)} times)" if len(effects) > 1 else ""
     what = name.replace("_", " ") + often
     if others := largest.aliases:
         what += f", or {' or '.join(o.replace('_', ' ') for o in others)}"
-    sure = format_probability(min(f.probability for f in found))
+    sure = format_probability(min(f.probability for f in effects))
     return EffectLine(
         what, clearest_parameter(largest.parameters), sure, _calibration_change(largest)
     )
@@ -79,8 +79,8 @@ def clearest_parameter(parameters: Mapping[str, Quantity]) -> str:
     """
     if not parameters:
         return "not known"
-    told = [n for n, q in parameters.items() if q.unit != "s"] or list(parameters)
-    name = max(told, key=lambda n: _significance(parameters[n]))
+    names = [n for n, q in parameters.items() if q.unit != "s"] or list(parameters)
+    name = max(names, key=lambda n: _significance(parameters[n]))
     clear = sum(
         _significance(q) > thresholds.STANDS_OUT
         for n, q in parameters.items()
@@ -105,19 +105,19 @@ def _significance(quantity: Quantity) -> float:
     return abs(quantity.value) / quantity.sigma
 
 
-def _calibration_change(found: FoundEffect) -> str:
+def _calibration_change(finding: FoundEffect) -> str:
     """What it does to the calibration, in a few words."""
-    effect = catalogue()[found.id]
+    effect = catalogue()[finding.id]
     if isinstance(effect, Chain):
         return TREATED[effect.treatment]
     if isinstance(effect, Scatter):
         return "widens its ±"
     if isinstance(effect, Line):
         return "nothing: subtracted"
-    if not found.moves:
+    if not finding.moves:
         return "nothing that shows"
-    name = max(found.moves, key=lambda n: _significance(found.moves[n]))
-    most = found.moves[name]
+    name = max(finding.moves, key=lambda n: _significance(finding.moves[n]))
+    most = finding.moves[name]
     sigmas = _significance(most)
     if sigmas < thresholds.MOVED:
         return f"less than {thresholds.MOVED:g} σ"
@@ -135,8 +135,8 @@ def verdict_probability(verdict: str, probability: float, named: int) -> str:
     together = (
         named > 1 and verdict != "consistent" and probability <= thresholds.CERTAIN
     )
-    told = f"probability {format_probability(probability)}"
-    return f"{told} for all of it together" if together else told
+    text = f"probability {format_probability(probability)}"
+    return f"{text} for all of it together" if together else text
 
 
 def format_probability(probability: float) -> str:

@@ -48,17 +48,17 @@ def with_uncertainty(quantity: Quantity) -> str:
     return f"{quantity.value:.{max(digits, 0)}f} ± {sigma:.{max(digits, 0)}f}{unit}"
 
 
-def effect_with_parameters(found: FoundEffect) -> str:
+def effect_with_parameters(effect: FoundEffect) -> str:
     """An effect with its significant parameters."""
     parts = []
-    for name, q in found.parameters.items():
+    for name, q in effect.parameters.items():
         if (
             isinstance(q.value, str)
             or not q.sigma
             or abs(q.value) > thresholds.STANDS_OUT * q.sigma
         ):
             parts.append(f"{name} = {with_uncertainty(q)}")
-    return f"{found.id} ({', '.join(parts)})" if parts else found.id
+    return f"{effect.id} ({', '.join(parts)})" if parts else effect.id
 
 
 def paragraph(
@@ -81,10 +81,10 @@ def paragraph(
     out += [_how_random(f) for f in effects if _is_random(f)]
     if verdict in ("left_out", "ambiguous") and effects:
         out += _improvement(*quality)
-    for one in effects:
-        if one.aliases:
-            others = join_words(one.aliases, "or")
-            out.append(f"{others} would explain it as well as {one.id}.")
+    for effect in effects:
+        if effect.aliases:
+            others = join_words(effect.aliases, "or")
+            out.append(f"{others} would explain it as well as {effect.id}.")
     out += dict.fromkeys(_unexplained(u, unknown) for u in unknown)
     return " ".join([*filter(None, out), *notes])
 
@@ -107,10 +107,10 @@ def _opening(
     if verdict == "ambiguous":
         return f"Something is left out, and it may be {listed}." if effects else ""
     where = _places(mismatch)
-    some = f" Besides, it leaves out {listed}." if listed else ""
+    omitted = f" Besides, it leaves out {listed}." if listed else ""
     return (
         "Recording and simulation differ, and no effect in the catalogue explains it"
-        f" ({where}).{some}"
+        f" ({where}).{omitted}"
     )
 
 
@@ -141,13 +141,13 @@ def _where(m: Mismatch) -> str:
     return f"{places}, {m.from_s:.0f} to {m.to_s:.0f} s"
 
 
-def _is_random(found: FoundEffect) -> bool:
-    return isinstance(catalogue()[found.id], Scatter)
+def _is_random(effect: FoundEffect) -> bool:
+    return isinstance(catalogue()[effect.id], Scatter)
 
 
-def _how_random(found: FoundEffect) -> str:
+def _how_random(effect: FoundEffect) -> str:
     return (
-        f"{found.id} is random: the uncertainties include it, and no equation is"
+        f"{effect.id} is random: the uncertainties include it, and no equation is"
         " fitted to it."
     )
 
@@ -165,20 +165,20 @@ def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
     ]
 
 
-def _unexplained(one: UnknownMismatch, all_: Sequence[UnknownMismatch]) -> str:
+def _unexplained(mismatch: UnknownMismatch, all_: Sequence[UnknownMismatch]) -> str:
     """A mismatch in a sentence that names all channels with the same mismatch."""
-    where = one.mismatch
+    where = mismatch.mismatch
     if np.isfinite(where.correlation):
         return (
             f"{where.channel} follows {where.covariate} (correlation"
-            f" {where.correlation:+.2f}); a smooth function of {one.cause} explains"
-            f" {100 * where.share:.0f} % of its variance."
+            f" {where.correlation:+.2f}); a smooth function of {mismatch.cause}"
+            f" explains {100 * where.share:.0f} % of its variance."
         )
     places = list_positions(where.positions)
-    if one.exchanged:
-        return exchange_text(one.exchanged).capitalize() + "."
-    if one.angle_errors:
-        angles = angle_errors_text(one.angle_errors, "had been")
+    if mismatch.exchanged:
+        return exchange_text(mismatch.exchanged).capitalize() + "."
+    if mismatch.angle_errors:
+        angles = angle_errors_text(mismatch.angle_errors, "had been")
         if len(where.positions) > 1:
             return (
                 f"{places.capitalize()} are off in the same way, as if {angles} in each"
@@ -188,7 +188,7 @@ def _unexplained(one: UnknownMismatch, all_: Sequence[UnknownMismatch]) -> str:
     alike = [
         u
         for u in all_
-        if (u.cause, u.mismatch.positions) == (one.cause, where.positions)
+        if (u.cause, u.mismatch.positions) == (mismatch.cause, where.positions)
     ]
     channels = " and ".join(dict.fromkeys(u.mismatch.channel for u in alike))
     verb = "is" if len(alike) == 1 else "are"
@@ -221,18 +221,18 @@ def setup_notes(explanation: Explanation) -> list[str]:
     """Sentences about turns and base that are no effects of the device."""
     indices_in_file = explanation.prepared.source.about.indices_in_file
     ways = [indices_in_file(pair) for pair in explanation.untracked_turns]
-    said = [
+    notes = [
         f"The turn from position {start + 1} to {end + 1} is not the one that the"
         " gyroscopes measured: samples may be lost there, or an output ran against its"
         " range; it has no weight"
         for start, end in ways
     ]
     if explanation.base_sinks:
-        said.append(
+        notes.append(
             "The base turned slowly while it was used, as what it stands on gives way:"
             " each ± includes it; set it on firm ground"
         )
-    return said
+    return notes
 
 
 def _undecided(explanation: Explanation) -> str:
@@ -243,11 +243,15 @@ def _undecided(explanation: Explanation) -> str:
         for name, probability in posterior.ranked_causes()
         if probability > thresholds.MENTIONED and name in catalogue()
     ]
-    said = (
+    sentence = (
         "The simulation leaves something out, which this recording shows too weakly to"
         f" name it (probability {1 - posterior.probability_of_noise_alone:.2f})"
     )
-    return f"{said}; likeliest: {', '.join(likeliest)}." if likeliest else f"{said}."
+    return (
+        f"{sentence}; likeliest: {', '.join(likeliest)}."
+        if likeliest
+        else f"{sentence}."
+    )
 
 
 def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:

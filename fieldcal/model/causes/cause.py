@@ -170,6 +170,12 @@ class Cause:
             self._nearest[other] = tuple(g for g, d in each if d == least)
         return self._nearest[other]
 
+    def full_variant(self, group: Group) -> Group:
+        """The variant with all its parameters; the group itself if it has them."""
+        whole = self.variants[0]
+        part = not group.shape and set(group.params) < set(whole.params)
+        return whole if part else group
+
     def single_errors_of(self, group: Group) -> tuple[Group, ...]:
         """The single position errors that a variant combines; else the variant."""
         if self.kind != "position":

@@ -69,8 +69,8 @@ class RowView:
     def with_origin(self, origin: int) -> Experience:
         """Inputs whose time since the turn counts from one origin."""
         if origin not in self._by_origin:
-            seen = replace(self.x, since_turn=self.since[origin])
-            self._by_origin[origin] = seen
+            since_origin = replace(self.x, since_turn=self.since[origin])
+            self._by_origin[origin] = since_origin
         return self._by_origin[origin]
 
 
@@ -116,8 +116,8 @@ def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> Gen
     """Columns of an effect of the catalogue."""
 
     def sensor(view: RowView) -> Array:
-        seen = view.with_origin(origin)
-        design: Array = effect.design(seen, shape or NO_SHAPE)  # type: ignore[attr-defined]
+        inputs = view.with_origin(origin)
+        design: Array = effect.design(inputs, shape or NO_SHAPE)  # type: ignore[attr-defined]
         return design
 
     def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
@@ -153,8 +153,8 @@ def bias_change_basis(
     def of(view: RowView) -> Array:
         courses = []
         for shape, origin in grid:
-            seen = view.with_origin(origin)
-            courses.append(effect.course(seen, shape or NO_SHAPE))
+            inputs = view.with_origin(origin)
+            courses.append(effect.course(inputs, shape or NO_SHAPE))
         return np.stack(courses, axis=1)
 
     return Course(effect.id, of, len(grid), True)
@@ -167,10 +167,10 @@ def separable_basis(
 
     def of(view: RowView) -> Array:
         parts = []
-        for origin, some in groupby(grid, key=itemgetter(1)):
-            seen = view.with_origin(origin)
-            pattern = effect.pattern(seen)
-            courses = [effect.course(seen, shape or NO_SHAPE) for shape, _ in some]
+        for origin, points in groupby(grid, key=itemgetter(1)):
+            inputs = view.with_origin(origin)
+            pattern = effect.pattern(inputs)
+            courses = [effect.course(inputs, shape or NO_SHAPE) for shape, _ in points]
             each = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
             parts.append(each.reshape(len(view.x), 6, -1))
         return np.concatenate(parts, axis=2)
@@ -207,9 +207,9 @@ def _with_changed_parameters(
     plain: Experience, state: State, effect: Effect, more: Array
 ) -> Experience:
     """Inputs with the parameters of a motion effect changed by `more`."""
-    there = [t.values for t in state.terms if t.effect is effect]
+    present = [t.values for t in state.terms if t.effect is effect]
     rest = tuple(t for t in state.terms if t.effect is not effect)
-    term = Term(effect, sum(there, np.zeros(len(more))) + more)
+    term = Term(effect, sum(present, np.zeros(len(more))) + more)
     return replace(state, terms=(*rest, term)).experienced(plain)
 
 
@@ -281,10 +281,10 @@ def earth_rate_direction(view: RowView) -> Array:
     """
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
-    seen = np.flatnonzero(view.nominal.earth_seen)
-    for k, side in enumerate(perpendicular_vectors(view.x.w[seen])):
-        at = 2 * view.nominal.position[seen] + k
-        out[seen[:, None], [3, 4, 5], at[:, None]] = view.state.scale[3:] * side
+    determined = np.flatnonzero(view.nominal.earth_seen)
+    for k, side in enumerate(perpendicular_vectors(view.x.w[determined])):
+        at = 2 * view.nominal.position[determined] + k
+        out[determined[:, None], [3, 4, 5], at[:, None]] = view.state.scale[3:] * side
     return out
 
 
@@ -312,7 +312,7 @@ def attitude_sides(plain: Experience, state: State) -> Iterator[CentralDifferenc
         known = np.zeros((len(state.small_rotation), 3))
     for off in ROTATION_STEP_RAD * np.eye(3):
         ends = (replace(state, attitude=known + s * off) for s in (1.0, -1.0))
-        up, down = (one.experienced(plain) for one in ends)
+        up, down = (shifted.experienced(plain) for shifted in ends)
         yield up, down, ROTATION_STEP_RAD
 
 
@@ -323,7 +323,7 @@ def small_rotation_sides(
     small = state.small_rotation
     for off in ROTATION_STEP_RAD * np.eye(2):
         ends = (replace(state, small_rotation=small + s * off) for s in (1.0, -1.0))
-        up, down = (one.experienced(plain) for one in ends)
+        up, down = (shifted.experienced(plain) for shifted in ends)
         yield up, down, ROTATION_STEP_RAD
 
 

@@ -45,11 +45,11 @@ def detents(x: Experience, oriented: Sequence[int] | Index) -> Iterator[Detent]:
             yield Detent(joint, float(value), same)
 
 
-def detent_rotations(some: Sequence[Detent], places: int) -> Array:
+def detent_rotations(shared: Sequence[Detent], places: int) -> Array:
     """Rotations of the positions by each detent, (2 p, m): 1 where its angle is set."""
-    out = np.zeros((2 * places, len(some)))
-    for k, one in enumerate(some):
-        out[2 * np.array(one.positions) + one.joint, k] = 1.0
+    out = np.zeros((2 * places, len(shared)))
+    for k, detent in enumerate(shared):
+        out[2 * np.array(detent.positions) + detent.joint, k] = 1.0
     return out
 
 
@@ -63,7 +63,7 @@ def detent_columns(table: ColumnTable, some: Sequence[Detent]) -> Index:
         for column in shared.T:
             off = columns.ROTATION_STEP_RAD * column.reshape(small.shape)
             ends = (replace(state, small_rotation=small + s * off) for s in (1, -1))
-            up, down = (one.experienced(plain) for one in ends)
+            up, down = (shifted.experienced(plain) for shifted in ends)
             yield up, down, columns.ROTATION_STEP_RAD
 
     basis = General(

@@ -121,13 +121,13 @@ class Dictionary(ColumnTable):
         Members without a counterpart are omitted.
         """
         here = {cause.key: cause for cause in self.causes}
-        found = {}
+        matched = {}
         for cause, group in members:
             same = here.get(cause.key)
-            some = [] if same is None else group.with_same_parameters(same.variants)
-            if same is not None and some:
-                found[same.key] = (same, min(some, key=group.shape_distance))
-        return tuple(found.values())
+            variants = [] if same is None else group.with_same_parameters(same.variants)
+            if same is not None and variants:
+                matched[same.key] = (same, min(variants, key=group.shape_distance))
+        return tuple(matched.values())
 
     @property
     def filters(self) -> Group | None:
@@ -137,11 +137,13 @@ class Dictionary(ColumnTable):
     @cached_property
     def groups_by_width(self) -> list[EqualWidthGroups]:
         """All groups of all causes, stacked by their number of leading columns."""
-        found: dict[int, list[tuple[int, int, Group]]] = {}
+        by_width: dict[int, list[tuple[int, int, Group]]] = {}
         for i, cause in enumerate(self.causes):
             for j, group in enumerate(cause.variants):
-                found.setdefault(len(group.leading_columns), []).append((i, j, group))
-        return [EqualWidthGroups.of(some) for some in found.values()]
+                by_width.setdefault(len(group.leading_columns), []).append(
+                    (i, j, group)
+                )
+        return [EqualWidthGroups.of(groups) for groups in by_width.values()]
 
     @cached_property
     def cause_log_priors(self) -> Array:
@@ -269,9 +271,9 @@ class Dictionary(ColumnTable):
 
     def _is_unoriented(self, p: int) -> bool:
         """Whether the direction of a position's force, or of its rate, is not known."""
-        there = self.x.position == p
-        spun = self.used[there, 3:].any() and self.x.speed[there].any()
-        force = self.used[there, :3].any() and not self.x.oriented[there].all()
+        inside = self.x.position == p
+        spun = self.used[inside, 3:].any() and self.x.speed[inside].any()
+        force = self.used[inside, :3].any() and not self.x.oriented[inside].all()
         return bool(spun or force)
 
     def _instability(self) -> None:

@@ -45,8 +45,8 @@ def _causes_of_effect(
     places = effect_columns(table, effect, grid)
     for part, at in parameter_groups(table, effect):
         variants = tuple(
-            _group(table, effect, part, some, point, columns)
-            for some in _parameter_subsets(table, effect, at)
+            _group(table, effect, part, params, point, columns)
+            for params in _parameter_subsets(table, effect, at)
             for point, columns in zip(grid, places, strict=True)
         )
         if variants:
@@ -70,12 +70,14 @@ def effect_group(
     effect = catalogue()[name]
     if not isinstance(effect, Motion | Sensor):
         raise TypeError(f"{name} has no equation")
-    some = [j for j, p in enumerate(effect.params)
+    params = [j for j, p in enumerate(effect.params)
             if not (turned and p.name in effect.turned_into)]  # fmt: skip
-    at = effect_columns(table, effect, [point])[0][some]
-    typical = np.array([effect.params[j].typical for j in some])
-    size = typical * units_of(table, effect)[some]
-    return Group(name, "", at, size, effect, *point, params=tuple(some), in_state=True)
+    at = effect_columns(table, effect, [point])[0][params]
+    typical = np.array([effect.params[j].typical for j in params])
+    size = typical * units_of(table, effect)[params]
+    return Group(
+        name, "", at, size, effect, *point, params=tuple(params), in_state=True
+    )
 
 
 def factory_group(
@@ -86,9 +88,9 @@ def factory_group(
     point: Point = NO_POINT,
 ) -> Group:
     """Group of an effect that the factory left, with coefficients of known size, SI."""
-    one = effect_group(table, name, turned, point)
-    wide = (size * units_of(table, catalogue()[name]))[list(one.params)]
-    return replace(one, cause="factory", part=name, typical=wide, fixed_size=1.0)
+    group = effect_group(table, name, turned, point)
+    wide = (size * units_of(table, catalogue()[name]))[list(group.params)]
+    return replace(group, cause="factory", part=name, typical=wide, fixed_size=1.0)
 
 
 def factory_groups(
@@ -136,7 +138,7 @@ def _group(
     table: ColumnTable,
     effect: Effect,
     part: str,
-    some: tuple[int, ...],
+    params: tuple[int, ...],
     point: Point,
     at: Index,
 ) -> Group:
@@ -144,8 +146,8 @@ def _group(
     every = np.array([p.typical for p in effect.params]) * units_of(table, effect)
     shape, origin = point
     return Group(
-        effect.id, part, at[list(some)], every[list(some)], effect, shape, origin, some,
-        in_state=True,
+        effect.id, part, at[list(params)], every[list(params)], effect, shape, origin,
+        params, in_state=True,
     )  # fmt: skip
 
 
@@ -175,10 +177,10 @@ def parameter_groups(
     names = [p.name for p in effect.params]
     if not set(names) <= set(CHANNELS):
         return [("", tuple(range(len(names))))]
-    seen = {CHANNELS[c] for c in table.observed}
+    observed = {CHANNELS[c] for c in table.observed}
     return [
         (part, tuple(j for j, n in enumerate(names)
-                     if CHANNELS.index(n) in at and n in seen))
+                     if CHANNELS.index(n) in at and n in observed))
         for part, at in TRIADS
     ]  # fmt: skip
 

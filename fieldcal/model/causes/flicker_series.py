@@ -70,7 +70,7 @@ class FlickerSeries:
 
     def at(self, t: Array) -> Array:
         """The terms interpolated at other instants (m,), (m, k)."""
-        return np.column_stack([np.interp(t, self.t, one) for one in self.terms.T])
+        return np.column_stack([np.interp(t, self.t, term) for term in self.terms.T])
 
     def residual_variance(self, y: Array, sd: Array, typical: Array) -> Array:
         """Variance of each row that the terms do not describe, (n, c).
@@ -85,10 +85,10 @@ class FlickerSeries:
         known = np.isfinite(y) & (np.nan_to_num(sd) > 0)
         size = np.zeros(y.shape[1])
         for c in np.flatnonzero(known.any(axis=0) & (len(self.variances) > 0)):
-            there = known[:, c]
-            off = np.where(there, y[:, c] - y[there, c].mean(), 0.0)
-            wide = MISSING_ROW_NOISE * float(sd[there, c].max())
-            size[c] = self._size(off, np.where(there, sd[:, c], wide), typical[c])
+            measured = known[:, c]
+            off = np.where(measured, y[:, c] - y[measured, c].mean(), 0.0)
+            wide = MISSING_ROW_NOISE * float(sd[measured, c].max())
+            size[c] = self._size(off, np.where(measured, sd[:, c], wide), typical[c])
         return np.outer(unit, (size * typical) ** 2)
 
     def _size(self, y: Array, sd: Array, typical: float) -> float:

@@ -42,13 +42,13 @@ class KnownRows:
         )  # fmt: skip
 
     @classmethod
-    def concatenated(cls, some: Sequence[KnownRows]) -> KnownRows:
+    def concatenated(cls, parts: Sequence[KnownRows]) -> KnownRows:
         """Concatenate several sets of rows, which are independent."""
-        columns = np.unique(np.concatenate([one.columns for one in some]))
+        columns = np.unique(np.concatenate([known.columns for known in parts]))
         design = []
-        for one in some:
-            part = np.zeros((len(one.residual), len(columns)))
-            part[:, np.searchsorted(columns, one.columns)] = one.design
+        for known in parts:
+            part = np.zeros((len(known.residual), len(columns)))
+            part[:, np.searchsorted(columns, known.columns)] = known.design
             design.append(part)
-        residual = np.concatenate([one.residual for one in some])
+        residual = np.concatenate([known.residual for known in parts])
         return cls(columns, np.vstack(design), residual)

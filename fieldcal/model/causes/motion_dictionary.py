@@ -102,10 +102,10 @@ class MotionDictionary(Dictionary):
             return out
 
         def unseen(view: RowView) -> Array:
-            both = np.zeros((6, 6))
-            both[ACC, ACC] = both[GYR, GYR] = place.rows.alignment.rotation
-            some = view.state.scale[:, None] * both[:, lost]
-            return np.broadcast_to(some, (len(view.x), 6, len(lost)))
+            rotation = np.zeros((6, 6))
+            rotation[ACC, ACC] = rotation[GYR, GYR] = place.rows.alignment.rotation
+            turned = view.state.scale[:, None] * rotation[:, lost]
+            return np.broadcast_to(turned, (len(view.x), 6, len(lost)))
 
         self.clock = self.add(General("clock", clock), 2)
         sizes = np.array([priors.CLOCK_S, priors.CLOCK_RATE])

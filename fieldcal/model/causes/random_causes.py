@@ -67,14 +67,14 @@ def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     wide = np.full(1, np.deg2rad(priors.REPEATED_MISTAKE_DEG))
     at = detent_columns(table, several)
     groups = tuple(
-        Group("repeated_angle", "", at[i : i + 1], wide, params=(one.joint,),
-              moved_positions=one.positions)
-        for i, one in enumerate(several)
+        Group("repeated_angle", "", at[i : i + 1], wide, params=(detent.joint,),
+              moved_positions=detent.positions)
+        for i, detent in enumerate(several)
     )  # fmt: skip
     if len(several) > 1:
-        some = tuple(sorted({p for one in several for p in one.positions}))
+        moved = tuple(sorted({p for detent in several for p in detent.positions}))
         every = np.repeat(wide, len(several))
-        groups += (Group("repeated_angle", "", at, every, moved_positions=some),)
+        groups += (Group("repeated_angle", "", at, every, moved_positions=moved),)
     yield Cause("repeated_angle", "", CHANCE, groups, "position")
 
 
@@ -94,10 +94,10 @@ def _causes_of_scatter(
         yield Cause(effect.id, "", effect.chance(table.x), (group,), "random")
         return
     for part, channels in TRIADS:
-        some = [c for c in channels if c in table.observed]
-        if some:
-            yield _walks(table, effect, part, [some], 1.0)
-            each = [[c] for c in some]
+        observed = [c for c in channels if c in table.observed]
+        if observed:
+            yield _walks(table, effect, part, [observed], 1.0)
+            each = [[c] for c in observed]
             yield _walks(
                 table, effect, f"{part}, one axis", each, priors.SINGLE_AXIS_SHARE
             )
@@ -107,23 +107,23 @@ def _walks(
     table: ColumnTable,
     effect: Scatter,
     part: str,
-    sets: Sequence[Sequence[int]],
+    channel_sets: Sequence[Sequence[int]],
     share: float,
 ) -> Cause:
     """Cause of random walks, with a variant for each set of channels."""
     shape, modes = table.span.walk(), table.wander.modes
     groups = tuple(
         Group(
-            effect.id, "".join(CHANNELS[c] for c in some),
-            np.concatenate([table.cosine_columns(c, modes[c]) for c in some]),
+            effect.id, "".join(CHANNELS[c] for c in channels),
+            np.concatenate([table.cosine_columns(c, modes[c]) for c in channels]),
             np.concatenate([
                 shape[: modes[c]] * effect.params[c].typical * table.unit[c]
-                for c in some
+                for c in channels
             ]),
             effect,
-            params=tuple(some),
+            params=tuple(channels),
         )
-        for some in sets
+        for channels in channel_sets
     )  # fmt: skip
     return Cause(effect.id, part, share * effect.chance(table.x), groups, "random")
 

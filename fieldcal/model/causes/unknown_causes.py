@@ -58,11 +58,12 @@ def typical_unknown_sizes(table: ColumnTable) -> Array:
 def _triad_courses(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
     """Causes of a course in time on all axes of a triad at once."""
     for part, channels in TRIADS:
-        some = [c for c in channels if c in table.observed]
-        if len(some) < 2:
+        observed = [c for c in channels if c in table.observed]
+        if len(observed) < 2:
             continue
         groups = [
-            _smooth_course(table, part, some, sizes, span) for span in smooth.HALF_WAVES
+            _smooth_course(table, part, observed, sizes, span)
+            for span in smooth.HALF_WAVES
         ]
         yield _cause("time", part, groups)
 
@@ -91,8 +92,10 @@ def _covariate_causes(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
                 parts.append(
                     at[smooth.force_time_columns(c)]
                 )  # a scale factor that changes
-            groups = [Group(covariate, CHANNELS[c], some, np.full(len(some), sizes[c]))
-                      for some in parts]  # fmt: skip
+            groups = [
+                Group(covariate, CHANNELS[c], columns, np.full(len(columns), sizes[c]))
+                for columns in parts
+            ]
             yield _cause(covariate, CHANNELS[c], groups)
 
 

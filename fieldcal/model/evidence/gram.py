@@ -171,29 +171,29 @@ class WeightedGram:
     def matrix(self, one: Index, other: Index | None) -> Array:
         """Phi^T R^-1 Phi of columns `one` and `other`; all columns if that is None."""
         rows = self.gram.index[one]
-        some = self.white[:, rows]
+        white = self.white[:, rows]
         if other is None:
-            out: Array = some.T @ self.white
+            out: Array = white.T @ self.white
             out += self.gram.within[rows]
             return out
         columns = self.gram.index[other]
         out = self.gram.within[np.ix_(rows, columns)]
         # of a product with itself, which is symmetric, half is calculated
-        out += some.T @ (some if one is other else self.white[:, columns])
+        out += white.T @ (white if one is other else self.white[:, columns])
         return out
 
     def rhs(self, columns: Index | None) -> Array:
         """Phi^T R^-1 (y - h) of some columns, or of all."""
-        some = slice(None) if columns is None else self.gram.index[columns]
-        out: Array = self.gram.rhs[some] + self.white[:, some].T @ self.residual
+        at = slice(None) if columns is None else self.gram.index[columns]
+        out: Array = self.gram.rhs[at] + self.white[:, at].T @ self.residual
         return out
 
     def diagonals(self, blocks: Sequence[Index]) -> list[Array]:
         """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each."""
         out: list[Array] = []
         for at, inner in zip(blocks, self.gram.blocks(blocks), strict=True):
-            some = self.white[:, self.gram.index[at]]
-            means = np.moveaxis(some, 0, 1)  # (m, r, k)
+            white = self.white[:, self.gram.index[at]]
+            means = np.moveaxis(white, 0, 1)  # (m, r, k)
             out.append(inner + np.swapaxes(means, 1, 2) @ means)
         return out
 
@@ -248,18 +248,18 @@ class Eliminated:
         scaled.flat[:: len(columns) + 1] += 1.0
         root = cholesky_root(scaled)
         half = triangular_inverse(root) * sizes
-        seen = half @ rows.rhs(columns)
-        score = 0.5 * (float(seen @ seen) - rows.square - rows.log_det)
+        projected = half @ rows.rhs(columns)
+        score = 0.5 * (float(projected @ projected) - rows.square - rows.log_det)
         score -= float(np.log(np.diag(root)).sum())  # (2)
-        return cls(rows, columns, sizes, half, half.T @ seen, score)
+        return cls(rows, columns, sizes, half, half.T @ projected, score)
 
     def places_of(self, columns: Index) -> Index:
         """Indices of columns in the set; of one that occurs twice, the last.
 
         The columns of a member come after those of the groups that are always in.
         """
-        found = [int(np.flatnonzero(self.columns == c)[-1]) for c in columns]
-        return np.array(found, dtype=np.intp)
+        places = [int(np.flatnonzero(self.columns == c)[-1]) for c in columns]
+        return np.array(places, dtype=np.intp)
 
     @cached_property
     def inverse(self) -> Array:
@@ -305,8 +305,13 @@ def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
     else:
         strength, axes = np.linalg.eigh(inner)
         power = (np.swapaxes(axes, -1, -2) @ rhs[..., None])[..., 0] ** 2
-    seen = strength > MIN_EIGENVALUE * np.maximum(np.asarray(own)[..., None], 1e-300)
-    strength, power = np.where(seen, strength, 0.0), np.where(seen, power, 0.0)
+    determined = strength > MIN_EIGENVALUE * np.maximum(
+        np.asarray(own)[..., None], 1e-300
+    )
+    strength, power = (
+        np.where(determined, strength, 0.0),
+        np.where(determined, power, 0.0),
+    )
     return gains_from_eigenvalues(strength, power)
 
 

@@ -85,21 +85,21 @@ def scan_instabilities(
     )
     common = _joint_gram(still, every)
     windows: NDArray[np.bool_] = np.any(moved, axis=1)
-    some = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
+    reduced = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
     table = np.append(
-        some.means[:, :, some.index[every]], some.residual[..., None], axis=2
+        reduced.means[:, :, reduced.index[every]], reduced.residual[..., None], axis=2
     )
     rows, width = int(moved.sum()), len(common)
     step = max(1, MAX_NUMBERS // (width * (rows + width)))
     parts = []
     for first in range(0, len(taus), step):
         part = slice(first, first + step)
-        root, log_det = some.whitening(taus[part])
+        root, log_det = reduced.whitening(taus[part])
         white = (root @ table)[:, moved[windows]]
         total = common + np.swapaxes(white, 1, 2) @ white  # (1)
-        found = _eliminate(total, sizes[part], further.shape)
-        score = found.score - 0.5 * (log_det + still.log_det)
-        parts.append(replace(found, score=score))
+        eliminated = _eliminate(total, sizes[part], further.shape)
+        score = eliminated.score - 0.5 * (log_det + still.log_det)
+        parts.append(replace(eliminated, score=score))
     names = InstabilityScan.__slots__
     return InstabilityScan(
         *(np.concatenate([getattr(p, n) for p in parts]) for n in names)
@@ -133,9 +133,9 @@ def _eliminate(total: Array, sizes: Array, shape: tuple[int, ...]) -> Instabilit
     wide = np.append(sizes, np.ones((n, 1)), axis=1)
     scaled = total[:, known][:, :, known] * wide[:, :, None] * wide[:, None, :]
     scaled[:, range(a + 1), range(a + 1)] += 1.0
-    both = cholesky_root(scaled)
-    root, seen = both[:, :-1, :-1], both[:, -1, :-1]
-    score = 0.5 * (1 - both[:, -1, -1] ** 2)
+    root_and_rhs = cholesky_root(scaled)
+    root, projected = root_and_rhs[:, :-1, :-1], root_and_rhs[:, -1, :-1]
+    score = 0.5 * (1 - root_and_rhs[:, -1, -1] ** 2)
     score -= np.log(np.diagonal(root, 0, 1, 2)).sum(axis=1)
     at = a + np.arange(int(np.prod(shape))).reshape(shape)
     own, rhs = total[:, at[:, :, None], at[:, None, :]], total[:, at, -1]
@@ -145,5 +145,5 @@ def _eliminate(total: Array, sizes: Array, shape: tuple[int, ...]) -> Instabilit
         taken = np.moveaxis(taken.reshape(n, a, *shape), 1, 2)  # (n, w, a, k)
         turned = np.swapaxes(taken, 2, 3)
         own = own - turned @ taken
-        rhs = rhs - (turned @ seen[:, None, :, None])[..., 0]
-    return InstabilityScan(score, sizes, root, seen, own, rhs, alone)
+        rhs = rhs - (turned @ projected[:, None, :, None])[..., 0]
+    return InstabilityScan(score, sizes, root, projected, own, rhs, alone)

@@ -64,6 +64,12 @@ class Set:
         """Whether it contains a cause without physics."""
         return any(cause.kind == "unknown" for cause, _ in self.members)
 
+    def sizes_of(self, kept: tuple[Member, ...]) -> Sizes:
+        """Its sizes, with those of only some of its members."""
+        pairs = zip(self.members, self.sizes.members, strict=True)
+        sizes = tuple(size for member, size in pairs if member in kept)
+        return Sizes(self.sizes.calibration, self.sizes.instability, sizes)
+
 
 def is_function(member: Member) -> bool:
     """Whether a member is an unknown function of several columns.
@@ -74,7 +80,7 @@ def is_function(member: Member) -> bool:
     return cause.kind == "unknown" and len(group.columns) > 1
 
 
-def variant_log_priors(cause: Cause, there: Iterable[Member]) -> Array:
+def variant_log_priors(cause: Cause, others: Iterable[Member]) -> Array:
     """Log prior probability of a cause, given others in the set.
 
     One value for each variant, or () if all variants have the same. A cause that begins
@@ -86,8 +92,8 @@ def variant_log_priors(cause: Cause, there: Iterable[Member]) -> Array:
         share = _with_other_odds(cause, share, cause.expected, priors.RESTART_CHANCE)
     if cause.kind != "effect":
         return share
-    there = list(there)
-    same = [m for m in there if m[0].name == cause.name]
+    others = list(others)
+    same = [m for m in others if m[0].name == cause.name]
     at_once = {g for _, other in same for g in cause.simultaneous_variants(other)}
     if at_once:
         off = any(g in other.expected for other, g in same)
@@ -95,17 +101,17 @@ def variant_log_priors(cause: Cause, there: Iterable[Member]) -> Array:
         odds = 1 / priors.BOTH_RESTART_ODDS if both else priors.COMPANION_CHANCE
         share = _with_other_odds(cause, share, at_once - both, odds)
         return _with_other_odds(cause, share, both, priors.BOTH_RESTART_ODDS)
-    if same or (cause.usual and any(other.usual for other, _ in there)):
+    if same or (cause.usual and any(other.usual for other, _ in others)):
         share = np.array(np.log(priors.COMPANION_CHANCE / len(cause.variants)))
     return share
 
 
 def _with_other_odds(
-    cause: Cause, share: Array, some: AbstractSet[Group], odds: float
+    cause: Cause, share: Array, sharing: AbstractSet[Group], odds: float
 ) -> Array:
-    """Log prior of each variant, if variants `some` share the total `odds`."""
-    among = [g in some for g in cause.variants]
-    return np.where(among, np.log(odds / max(len(some), 1)), share)
+    """Log prior of each variant, if the variants `sharing` share the total `odds`."""
+    among = [g in sharing for g in cause.variants]
+    return np.where(among, np.log(odds / max(len(sharing), 1)), share)
 
 
 class Sets:
@@ -121,9 +127,9 @@ class Sets:
 
     def __init__(self, dictionary: Dictionary, gram: Gram) -> None:
         self.dictionary, self.gram = dictionary, gram
-        there = np.unique(gram.kind[gram.info > 0])
+        kinds = np.unique(gram.kind[gram.info > 0])
         self.typical_instability = dictionary.typical_instability * np.isin(
-            np.arange(7), there
+            np.arange(7), kinds
         )
         self.visited: dict[SetKey, Set] = {}
         self.corrections: dict[frozenset[str], float] = {}
@@ -148,9 +154,9 @@ class Sets:
             self.visited[key] = Set(members, sizes, score, state)
         return self.visited[key]
 
-    def corrected_score(self, there: Set) -> float:
+    def corrected_score(self, visited: Set) -> float:
         """Score of a set about its own state."""
-        return there.score + self.corrections.get(there.keys_in_state, 0.0)
+        return visited.score + self.corrections.get(visited.keys_in_state, 0.0)
 
     def set_log_prior(self, members: Iterable[Member]) -> float:
         """Log prior probability of the causes of a set."""
@@ -178,14 +184,10 @@ class Sets:
         """Log prior of instabilities (..., 7), as `sizing.instability_log_prior`."""
         return instability_log_prior(instability, self.typical_instability)
 
-    def without(self, there: Set, i: int) -> Set:
+    def without(self, whole: Set, i: int) -> Set:
         """The set without one of its members."""
-        kept = tuple(m for j, m in enumerate(there.members) if j != i)
-        return self.evaluate(kept, self.sizes_of(there, kept))
+        return self.reduced(whole, (*whole.members[:i], *whole.members[i + 1 :]))
 
-    @staticmethod
-    def sizes_of(there: Set, kept: tuple[Member, ...]) -> Sizes:
-        """Sizes of a set that is reduced to some of its members, to start from."""
-        pairs = zip(there.members, there.sizes.members, strict=True)
-        sizes = tuple(s for m, s in pairs if m in kept)
-        return Sizes(there.sizes.calibration, there.sizes.instability, sizes)
+    def reduced(self, whole: Set, kept: tuple[Member, ...]) -> Set:
+        """The set with only some of its members, evaluated from the sizes of these."""
+        return self.evaluate(kept, whole.sizes_of(kept))

@@ -81,10 +81,10 @@ def instability_log_prior(
     return total if total.ndim else float(total)
 
 
-def triad_log_prior(some: Array, density: Array = INSTABILITY_LOG_DENSITY) -> Array:
+def triad_log_prior(sizes: Array, density: Array = INSTABILITY_LOG_DENSITY) -> Array:
     """Log prior of the instabilities (..., n) of the axes of one triad, (...)."""
-    middle = some.sum(axis=-1) / some.shape[-1]
-    distance = (some - middle[..., None]) * (LOG_SIZE_STEP / priors.AXES_LOG_SPREAD)
+    middle = sizes.sum(axis=-1) / sizes.shape[-1]
+    distance = (sizes - middle[..., None]) * (LOG_SIZE_STEP / priors.AXES_LOG_SPREAD)
     likely = np.interp(middle, np.arange(len(density)), density)
     out: Array = likely - 0.5 * (distance * distance).sum(axis=-1)
     return out
@@ -165,8 +165,8 @@ class Sizing:
             before = (*self.sizes, *self.instability)
             profiles = self._maximise_groups(free)
             for triad in TRIADS:
-                if some := [c for c in triad if c in channels]:
-                    profiles += self._maximise_triad(some)
+                if free_channels := [c for c in triad if c in channels]:
+                    profiles += self._maximise_triad(free_channels)
             if (*self.sizes, *self.instability) == before:
                 break
         score = self.eliminated().score
@@ -175,10 +175,10 @@ class Sizing:
         for profile in profiles:
             score += float(np.logaddexp.reduce(profile - profile.max()))
         k = self.count
-        found = Sizes(
+        sizes = Sizes(
             tuple(self.sizes[:k]), tuple(self.instability), tuple(self.sizes[k:])
         )
-        return found, score, self._prior_sigma()
+        return sizes, score, self._prior_sigma()
 
     def eliminated(self) -> Eliminated:
         """The set eliminated at the current sizes; cached."""
@@ -216,10 +216,10 @@ class Sizing:
             profiles.append(profile)
         return profiles
 
-    def _gains(self, state: Eliminated, some: Sequence[int]) -> dict[int, Array]:
+    def _gains(self, state: Eliminated, numbers: Sequence[int]) -> dict[int, Array]:
         """Gain over the sizes of each of some groups, calculated by width."""
         by_width: dict[int, list[int]] = {}
-        for i in some:
+        for i in numbers:
             place = self.places[i]
             by_width.setdefault(place.stop - place.start, []).append(i)
         out: dict[int, Array] = {}

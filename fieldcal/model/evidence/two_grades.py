@@ -56,9 +56,9 @@ def _kinds(groups: Sequence[Group]) -> Iterator[tuple[str, Index]]:
     """The columns of each size of `FactoryErrors`, by its name."""
     for kind in (field.name for field in fields(FactoryErrors)):
         names = STRAIGHT if kind in STRAIGHT else (kind,)
-        some = [g.columns for g in groups if g.part in names]
-        some += [_of_biases(g, kind) for g in groups if g.part in WARMING_EFFECTS]
-        yield kind, np.concatenate([np.empty(0, dtype=np.intp), *some])
+        columns = [g.columns for g in groups if g.part in names]
+        columns += [_of_biases(g, kind) for g in groups if g.part in WARMING_EFFECTS]
+        yield kind, np.concatenate([np.empty(0, dtype=np.intp), *columns])
 
 
 def _of_biases(group: Group, kind: str) -> Index:

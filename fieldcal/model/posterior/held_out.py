@@ -17,8 +17,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.evidence.sets import Set
-from fieldcal.model.search.selection import Search
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
@@ -52,7 +51,7 @@ class HeldOut:
         columns = _columns(self.dictionary, sets) | (fitted.values != 0)
         self.columns = np.flatnonzero(columns)
         self.linear = [_select_columns(part, columns) for part in fitted.linear]
-        self._rest: dict[int, Search | None] = {}
+        self._rest: dict[int, Sets | None] = {}
 
     def residual(self, sets: Sequence[Set]) -> Array:
         """Held-out residuals of all rows, (n, 6); nan where there is no prediction.
@@ -61,11 +60,11 @@ class HeldOut:
         """
         d, out = self.dictionary, np.full(self.fitted.rows.y.shape, np.nan)
         for i in np.unique(self.fold) if self.fold.max() else ():
-            if (search := self._without(int(i))) is None:
+            if (rest := self._without(int(i))) is None:
                 continue
             left = self.fold == i
             chosen = max(
-                (search.evaluate(s.members, s.sizes) for s in sets),
+                (rest.evaluate(s.members, s.sizes) for s in sets),
                 key=lambda s: s.score,
             )
             step = (
@@ -80,18 +79,18 @@ class HeldOut:
             _predict(out, rows, step, chosen, d)
         return out
 
-    def density(self, one: Set) -> float:
+    def density(self, candidate: Set) -> float:
         """Log probability density of each part given the others, summed over the parts.
 
         The sizes are estimated from the others. A constant of the rows is omitted; nan
         where there is no prediction.
         """
-        parts = list(self._parts(one))
+        parts = list(self._parts(candidate))
         return (
             sum(whole.score - rest.score for whole, rest in parts) if parts else np.nan
         )
 
-    def squares(self, one: Set) -> tuple[float, int]:
+    def squares(self, candidate: Set) -> tuple[float, int]:
         """Sum of the whitened squares of the parts' predictions, and number of rows.
 
         The prediction's own uncertainty is counted,
@@ -100,7 +99,7 @@ class HeldOut:
 
         with u the estimate and b = Phi^T R^-1 (y - h); (nan, 0) where none can be.
         """
-        parts = list(self._parts(one))
+        parts = list(self._parts(candidate))
         if not parts:
             return float("nan"), 0
         total = sum(
@@ -108,35 +107,31 @@ class HeldOut:
         )
         return total, sum(len(part.white) for part in self.linear)
 
-    def _parts(self, one: Set) -> Iterator[tuple[Eliminated, Eliminated]]:
+    def _parts(self, candidate: Set) -> Iterator[tuple[Eliminated, Eliminated]]:
         """A set in all rows and without each part, at the sizes estimated without it.
 
         Empty if a part cannot be predicted.
         """
         every = gram(self.linear, self.dictionary, self.fitted.values, (), self.columns)
-        searches = [self._without(int(i)) for i in np.unique(self.fold)]
-        if not self.fold.max() or None in searches:
+        rests = [self._without(int(i)) for i in np.unique(self.fold)]
+        if not self.fold.max() or None in rests:
             return
-        for search in filter(None, searches):
-            found = search.evaluate(one.members, one.sizes)
-            tau = search.instability_sigma(found.sizes.instability)
-            rest = found.state
-            yield (
-                Eliminated.of(
-                    every.with_instability(tau), rest.columns, rest.prior_sigma
-                ),
-                rest,
-            )
+        for sets in filter(None, rests):
+            fitted = sets.evaluate(candidate.members, candidate.sizes)
+            tau = sets.instability_sigma(fitted.sizes.instability)
+            rest = fitted.state
+            whole = every.with_instability(tau)
+            yield Eliminated.of(whole, rest.columns, rest.prior_sigma), rest
 
-    def _without(self, i: int) -> Search | None:
-        """Search over the rows without a part; None if a channel has no others."""
+    def _without(self, i: int) -> Sets | None:
+        """Sets over the rows without a part; None if a channel has no others."""
         if i not in self._rest:
             left = self.fold == i
             rest = [_select_rows(part, ~left[part.rows]) for part in self.linear]
             values, d = self.fitted.values, self.dictionary
             determined = all(len(part.white) for part in rest)
             rows = gram(rest, d, values, (), self.columns) if determined else None
-            self._rest[i] = None if rows is None else Search(d, rows)
+            self._rest[i] = None if rows is None else Sets(d, rows)
         return self._rest[i]
 
 
@@ -160,9 +155,9 @@ def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Arr
     linear = [_select_columns(part, columns) for part in fitted.linear]
     for i in range(min(len(turns), MAX_FOLDS)):
         left = turns[i::MAX_FOLDS]
-        kept = [t for t in turns if all(t is not one for one in left)]
+        kept = [t for t in turns if all(t is not other for other in left)]
         rows = gram(linear, d, fitted.values, kept, np.flatnonzero(columns))
-        chosen = Search(d, rows).evaluate(fitted.set.members, fitted.set.sizes)
+        chosen = Sets(d, rows).evaluate(fitted.set.members, fitted.set.sizes)
         out += [turn_residual(t, estimates_by_column(chosen.state, d)) for t in left]
     return np.concatenate(out) if out else np.zeros(0)
 
@@ -189,16 +184,16 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
     return out
 
 
-def _residual_square(there: Eliminated) -> float:
+def _residual_square(eliminated: Eliminated) -> float:
     """Q, the weighted residual square plus the prior square of the estimate."""
-    rhs = there.rows.rhs(there.columns)
-    return there.rows.square - float(rhs @ there.estimate)
+    rhs = eliminated.rows.rhs(eliminated.columns)
+    return eliminated.rows.square - float(rhs @ eliminated.estimate)
 
 
 def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
     out = np.zeros(d.width, dtype=bool)
-    for one in sets:
-        out[one.state.columns] = True
+    for candidate in sets:
+        out[candidate.state.columns] = True
     out[d.rotations] = True
     return out
 

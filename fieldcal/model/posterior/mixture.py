@@ -116,21 +116,21 @@ class Mixing:
         self,
         dictionary: Dictionary,
         gram: Gram,
-        there: Set,
+        fitted: Set,
         typical_instability: Array,
         given: bool = True,
         doubt: bool = True,
     ) -> None:
         self.dictionary, self.there, self.typical_instability = (
             dictionary,
-            there,
+            fitted,
             typical_instability,
         )
         self.density = GIVEN_SET_LOG_DENSITY if given else INSTABILITY_LOG_DENSITY
         sizing = Sizing(
-            dictionary, gram, typical_instability, there.members, there.sizes
+            dictionary, gram, typical_instability, fitted.members, fitted.sizes
         )
-        self.columns, self.prior_sigma = sizing.columns, there.state.prior_sigma
+        self.columns, self.prior_sigma = sizing.columns, fitted.state.prior_sigma
         self.doubted = self._doubted() if given and doubt else []
         more = [at for _, at in self.doubted]
         self.gram = gram.select_columns(np.concatenate([self.columns, *more]))
@@ -139,7 +139,7 @@ class Mixing:
     def run(self) -> Mixture:
         """Average over all hypotheses that count."""
         lists = [self._triad_hypotheses(triad) for triad in TRIADS]
-        best = sum(max(h.score for h in some) for some in lists)
+        best = sum(max(h.score for h in hypotheses) for hypotheses in lists)
         near = [parts for parts in product(*lists)
                 if sum(h.score for h in parts) > best - MAX_LOG_DISTANCE]  # fmt: skip
         tau = (
@@ -163,11 +163,11 @@ class Mixing:
     def _doubted(self) -> list[tuple[int, Index]]:
         """Windows that may be bad by the accelerometers, with their columns."""
         d = self.dictionary
-        seen = [c for c in d.observed if c < 3]
+        observed = [c for c in d.observed if c < 3]
         held = len(d.window_positions)
-        if held <= 2 or not seen:
+        if held <= 2 or not observed:
             return []
-        every = np.array(seen) * held + d.windows
+        every = np.array(observed) * held + d.windows
         return [(i, (every + i).astype(np.intp)) for i in range(held)]
 
     def _triad_hypotheses(self, triad: Sequence[int]) -> list[Hypothesis]:
@@ -179,11 +179,11 @@ class Mixing:
         sizes, known = self._shifted(triad)
         doubted = self._bad_columns() if triad[0] == 0 and self.doubted else NONE
         taus = priors.SIZES[np.array(sizes)] * self.typical_instability
-        there = scan_instabilities(
+        scan = scan_instabilities(
             self.gram, self.columns, self.prior_sigma, taus, doubted
         )
-        alone = there.score + known
-        found = [
+        alone = scan.score + known
+        hypotheses = [
             Hypothesis(s, -1, 0, k, v)
             for s, k, v in zip(sizes, known.tolist(), alone.tolist(), strict=True)
         ]
@@ -192,11 +192,11 @@ class Mixing:
                 known[:, None] + float(np.log(priors.BAD_WINDOW_CHANCE)) + LOG_DENSITY
             )  # (n, v)
             every = (
-                self._with_bad(there) + there.score[:, None, None] + log_prior[:, None]
+                self._with_bad(scan) + scan.score[:, None, None] + log_prior[:, None]
             )
             each = np.logaddexp.reduce(every, axis=(0, 2))
             self.bad = np.exp(each - np.logaddexp.reduce([*alone, *each]))
-            found += [
+            hypotheses += [
                 Hypothesis(
                     sizes[n], i, v, float(log_prior[n, v]), float(every[n, i, v])
                 )
@@ -204,8 +204,8 @@ class Mixing:
                     every > alone.max() - MAX_LOG_DISTANCE
                 ).tolist()
             ]
-        best = max(h.score for h in found)
-        return [h for h in found if h.score > best - MAX_LOG_DISTANCE]
+        best = max(h.score for h in hypotheses)
+        return [h for h in hypotheses if h.score > best - MAX_LOG_DISTANCE]
 
     def _shifted(self, triad: Sequence[int]) -> tuple[list[tuple[int, ...]], Array]:
         """Instabilities of a triad, all scaled together, with their log priors.
@@ -231,8 +231,8 @@ class Mixing:
 
     def _smallest_visible_index(self, triad: Sequence[int]) -> int:
         """Index of the smallest of `SIZES` at which a triad's instability shows."""
-        seen = np.isin(self.gram.kind, triad) & (self.gram.info > 0)
-        noise = 1 / np.sqrt(self.gram.info[seen].max(initial=1e-300))
+        measured = np.isin(self.gram.kind, triad) & (self.gram.info > 0)
+        noise = 1 / np.sqrt(self.gram.info[measured].max(initial=1e-300))
         typical = float(self.typical_instability[list(triad)].max())
         return int(np.searchsorted(priors.SIZES * typical, MIN_INSTABILITY * noise))
 
@@ -240,19 +240,19 @@ class Mixing:
         """Columns of the windows that may be bad, (w, k)."""
         return np.array([at for _, at in self.doubted])
 
-    def _with_bad(self, there: InstabilityScan) -> Array:
+    def _with_bad(self, scan: InstabilityScan) -> Array:
         """Gains if a window is bad, by instability, window and size, (n, w, v)."""
         typical = self._typical(self.doubted[0][1])
-        inner = there.inner * typical * typical[:, None]
-        own = (there.alone * typical**2).max(axis=-1)
-        return evidence_gains(inner, there.rhs * typical, own)
+        inner = scan.inner * typical * typical[:, None]
+        own = (scan.alone * typical**2).max(axis=-1)
+        return evidence_gains(inner, scan.rhs * typical, own)
 
     def _sizes_of(self, parts: Hypotheses) -> list[int]:
         """Instabilities of hypotheses of each triad together, (7,)."""
         sizes = list(self.there.sizes.instability)
-        for triad, one in zip(TRIADS, parts, strict=True):
+        for triad, hypothesis in zip(TRIADS, parts, strict=True):
             for c in triad:
-                sizes[c] = one.sizes[c]
+                sizes[c] = hypothesis.sizes[c]
         return sizes
 
     def _combine_exactly(
@@ -267,20 +267,20 @@ class Mixing:
         mean, covariance = np.empty((len(near), k)), np.empty((len(near), k, k))
         window = np.array([acc.window for acc, *_ in near])
         for bad in np.unique(window).tolist():
-            some = np.flatnonzero(window == bad)
+            rows = np.flatnonzero(window == bad)
             columns, prior_sigma = (
                 self.columns,
-                np.tile(self.prior_sigma, (len(some), 1)),
+                np.tile(self.prior_sigma, (len(rows), 1)),
             )
             if bad >= 0:
                 at = dict(self.doubted)[bad]
-                off = priors.SIZES[[near[h][0].size for h in some.tolist()]]
+                off = priors.SIZES[[near[h][0].size for h in rows.tolist()]]
                 columns = np.append(columns, at)
                 prior_sigma = np.hstack([prior_sigma, np.outer(off, self._typical(at))])
-            there = scan_instabilities(self.gram, columns, prior_sigma, tau[some], NONE)
-            score[some] += there.score
-            means, covariances = there.posterior()
-            mean[some], covariance[some] = means[:, :k], covariances[:, :k, :k]
+            scan = scan_instabilities(self.gram, columns, prior_sigma, tau[rows], NONE)
+            score[rows] += scan.score
+            means, covariances = scan.posterior()
+            mean[rows], covariance[rows] = means[:, :k], covariances[:, :k, :k]
         return score, mean, covariance
 
     def _typical(self, at: Index) -> Array:

@@ -63,17 +63,17 @@ class ModelAverage:
         """Sets with enough weight, averaged over sizes, and their weights."""
         every, out = self.posterior.weights_on_grid, list[tuple[Set, float]]()
         least = np.exp(-MAX_LOG_DISTANCE) * max(w for _, w in every)
-        for one, weight in every:
+        for fitted, weight in every:
             if weight > least:
-                alike = self._with_mixed_sizes(one)
+                alike = self._with_mixed_sizes(fitted)
                 out += [(s, weight / len(alike)) for s in alike]
         return out
 
-    def _with_mixed_sizes(self, one: Set) -> Sequence[Set]:
+    def _with_mixed_sizes(self, fitted: Set) -> Sequence[Set]:
         """The set with its estimate averaged over sizes; several for the best set."""
-        if one is self.posterior.best:
+        if fitted is self.posterior.best:
             return self.best
-        return [average_over_sizes(self.posterior.search, one)]
+        return [average_over_sizes(self.posterior.sets, fitted)]
 
     def average_of_member(self, member: Member) -> tuple[Array, Array]:
         """Mean (k,) and covariance (k, k) of a member's parameters, if it is present.
@@ -83,38 +83,41 @@ class ModelAverage:
         omitted.
         """
         cause, group = member
-        there = [(s, w) for s, w in self.sets if cause.key in s.keys]
-        if self.posterior.search.dictionary.unoriented.any():
+        containing = [(s, w) for s, w in self.sets if cause.key in s.keys]
+        if self.posterior.sets.dictionary.unoriented.any():
             mine = set(group.params)
-            there = [
-                (s, w) for s, w in there if set(_group_in(s, member).params) <= mine
+            containing = [
+                (s, w)
+                for s, w in containing
+                if set(_group_in(s, member).params) <= mine
             ]
 
-        there = there or [(s, 1.0) for s in self.best]  # it is too unlikely to count
+        if not containing:  # the member is too unlikely to count
+            containing = [(s, 1.0) for s in self.best]
 
-        def places(one: Set) -> list[Index]:
-            own = _group_in(one, member)
+        def places(fitted: Set) -> list[Index]:
+            own = _group_in(fitted, member)
             at = dict(zip(own.params or own.columns, own.columns, strict=True))
             wanted = [at.get(p, -1) for p in group.params or group.columns]
-            return [np.flatnonzero(one.state.columns == c)[-1:] for c in wanted]
+            return [np.flatnonzero(fitted.state.columns == c)[-1:] for c in wanted]
 
-        return average_over_sets(there, places, self._estimate)
+        return average_over_sets(containing, places, self._estimate)
 
     def average_of_columns(self, columns: Index) -> tuple[Array, Array]:
         """Mean (k,) and covariance (k, k) of columns."""
         return average_over_sets(self.sets, _places_of(columns), self._estimate)
 
-    def _estimate(self, one: Set) -> Estimate:
+    def _estimate(self, fitted: Set) -> Estimate:
         """Estimate of a set, with the uncertainty of `unfitted` effects; cached."""
-        if one not in self._known:
-            left = self.posterior.search.dictionary.unfitted
-            self._known[one] = set_estimate(one, left)
-        return self._known[one]
+        if fitted not in self._known:
+            left = self.posterior.sets.dictionary.unfitted
+            self._known[fitted] = set_estimate(fitted, left)
+        return self._known[fitted]
 
 
-def _group_in(one: Set, member: Member) -> Group:
+def _group_in(fitted: Set, member: Member) -> Group:
     """The group by which a set has the cause of a member."""
-    (own,) = (g for c, g in one.members if c.key == member[0].key)
+    (own,) = (g for c, g in fitted.members if c.key == member[0].key)
     return own
 
 
@@ -142,12 +145,12 @@ def average_over_sets(
     `estimate` gives the estimate of each set; that of its state if None.
     """
     means, covs = [], []
-    for one, _ in sets:
-        at = places(one)
-        pick = np.zeros((len(at), len(one.state.columns)))
+    for fitted, _ in sets:
+        at = places(fitted)
+        pick = np.zeros((len(at), len(fitted.state.columns)))
         for row, some in zip(pick, at, strict=True):
             row[some] = 1.0
-        mean, root = (estimate or set_estimate)(one)
+        mean, root = (estimate or set_estimate)(fitted)
         picked = pick @ root
         means.append(pick @ mean)
         covs.append(picked @ picked.T)
@@ -158,31 +161,33 @@ def average_over_sets(
     return mean, cov + covariance_of_means(np.array(means), weight)  # (1)
 
 
-def _groups_not_in(one: Set, more: Sequence[Group]) -> list[Group]:
+def _groups_not_in(fitted: Set, more: Sequence[Group]) -> list[Group]:
     """Groups, each named by its part, of effects that a set does not contain."""
-    names = {cause.name for cause, _ in one.members}
+    names = {cause.name for cause, _ in fitted.members}
     return [group for group in more if group.part not in names]
 
 
-def eliminate_with_groups(one: Set, more: Sequence[Group]) -> Eliminated:
+def eliminate_with_groups(fitted: Set, more: Sequence[Group]) -> Eliminated:
     """Eliminate a set's columns and those groups of `more` that it lacks."""
-    left, told = _groups_not_in(one, more), one.state
-    columns = np.concatenate([told.columns, *(group.columns for group in left)])
-    sizes = np.concatenate([told.prior_sigma, *(group.typical for group in left)])
-    return Eliminated.of(told.rows, columns, sizes)
+    missing, state = _groups_not_in(fitted, more), fitted.state
+    columns = np.concatenate([state.columns, *(group.columns for group in missing)])
+    sizes = np.concatenate([state.prior_sigma, *(group.typical for group in missing)])
+    return Eliminated.of(state.rows, columns, sizes)
 
 
-def set_estimate(one: Set, unfitted: Sequence[Group] = ()) -> Estimate:
+def set_estimate(fitted: Set, unfitted: Sequence[Group] = ()) -> Estimate:
     """Estimate of a set's columns, with the groups of `unfitted` eliminated, (2)."""
-    left, told = _groups_not_in(one, unfitted), one.state
-    if not left:
-        return told.estimate, told.half.T
-    columns = np.concatenate([group.columns for group in left])
-    typical = np.concatenate([group.typical for group in left])
-    state = Eliminated.of(told.rows, told.columns, told.prior_sigma)
+    missing, posterior = _groups_not_in(fitted, unfitted), fitted.state
+    if not missing:
+        return posterior.estimate, posterior.half.T
+    columns = np.concatenate([group.columns for group in missing])
+    typical = np.concatenate([group.typical for group in missing])
+    state = Eliminated.of(posterior.rows, posterior.columns, posterior.prior_sigma)
     inner, rhs = state.schur_complement(columns, typical)
     inner.flat[:: len(columns) + 1] += 1.0
     half = triangular_inverse(cholesky_root(inner))
     shared = state.rows.matrix(state.columns, columns) * typical
     moved = state.inverse @ shared @ half.T
-    return told.estimate - moved @ (half @ rhs), np.hstack([told.half.T, moved])  # (2)
+    return posterior.estimate - moved @ (half @ rhs), np.hstack(
+        [posterior.half.T, moved]
+    )  # (2)

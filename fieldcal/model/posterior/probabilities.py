@@ -23,7 +23,8 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.search.offer import Offer
-from fieldcal.model.search.selection import ALTERNATIVE_MARGIN, Search
+from fieldcal.model.search.selection import Search
+from fieldcal.model.search.variations import ALTERNATIVE_MARGIN, visit_variations
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,14 +72,15 @@ class Posterior:
     def __init__(
         self, search: Search, best: Set, refined: Callable[[Set], Set] | None = None
     ) -> None:
-        self.search, self.best, self._refined = search, best, refined
+        self.search, self.sets, self.best = search, search.sets, best
+        self._refined = refined
         self._nearer: list[tuple[Set, Set]] = []
         every = dict.fromkeys(c.name for c, _ in best.members)
         instead = {name: self._alternatives_to(name) for name in every}
         self.alternatives = {name: instead[name] for name in self.cause_names(best)}
-        for one in list(search.visited.values()) if best.members else ():
-            if one.score > best.score - MAX_LOG_DISTANCE:
-                search.visit_variations(one, best.score)
+        for visited in list(self.sets.visited.values()) if best.members else ():
+            if visited.score > best.score - MAX_LOG_DISTANCE:
+                visit_variations(self.sets, visited, best.score)
         self._visit_likely_additions()
 
     def _visit_likely_additions(self) -> None:
@@ -88,28 +90,29 @@ class Posterior:
         uncertainty of the calibration. Causes that the rows do not distinguish from the
         calibration are not visited.
         """
-        shown = self.search.shown_beside(self.best)
-        for offer in self.search.offers(self.best):
+        offers = self.search.offers
+        shown = offers.shown_in_addition(self.best)
+        for offer in offers.ranked(self.best):
             near = offer.score > self.best.score - ALTERNATIVE_MARGIN
             if near and shown(offer.member[1]):
-                self.search.accept(self.best, offer)
+                offers.accept(self.best, offer)
 
     @staticmethod
-    def cause_names(some: Set) -> tuple[str, ...]:
+    def cause_names(fitted: Set) -> tuple[str, ...]:
         """Names of the reportable causes of a set, each once."""
-        return tuple(dict.fromkeys(c.name for c, _ in some.members if c.reportable))
+        return tuple(dict.fromkeys(c.name for c, _ in fitted.members if c.reportable))
 
     def without(self, name: str) -> Set:
         """The best set without a cause, on both triads."""
         kept = tuple(m for m in self.best.members if m[0].name != name)
-        return self.search.evaluate(kept, self.search.sizes_of(self.best, kept))
+        return self.sets.reduced(self.best, kept)
 
     def _alternatives_to(self, name: str) -> dict[str, Set]:
         """Sets with another cause instead of one, by the name of the other."""
-        less, found = self.without(name), dict[str, Set]()
+        less, alternatives = self.without(name), dict[str, Set]()
         parts = {c.part for c, _ in self.best.members if c.name == name}
         own, near = self.evidence(self.best), 0
-        offers = self.search.offers(less, self.best.sizes)
+        offers = self.search.offers.ranked(less, self.best.sizes)
         # predictions are compared with that of the cause itself, not with a fit
         itself = [o for o in offers if o.member[0].name == name]
         predicted = max(
@@ -127,30 +130,36 @@ class Posterior:
                 continue
             if (near := near + 1) > MAX_ALTERNATIVES:
                 break
-            there = self._with_both_triads(less, offer, parts, offers)
+            alternative = self._with_both_triads(less, offer, parts, offers)
             if not cause.reportable:  # its set counts, but noise is no alias
                 continue
-            if self._refined_evidence(there, own) > own - thresholds.ALIAS_LOG_MARGIN:
-                if cause.name not in found or there.score > found[cause.name].score:
-                    found[cause.name] = there
-        return found
+            if (
+                self._refined_evidence(alternative, own)
+                > own - thresholds.ALIAS_LOG_MARGIN
+            ):
+                if (
+                    cause.name not in alternatives
+                    or alternative.score > alternatives[cause.name].score
+                ):
+                    alternatives[cause.name] = alternative
+        return alternatives
 
-    def _refined_evidence(self, there: Set, own: float) -> float:
+    def _refined_evidence(self, candidate: Set, own: float) -> float:
         """Evidence of a set; with refined time constants if it is no alias without.
 
         The best set is refined, so a set on the grid would be at a disadvantage.
         """
-        at_points = self.evidence(there)
+        at_points = self.evidence(candidate)
         if self._refined is None or at_points > own - thresholds.ALIAS_LOG_MARGIN:
             return at_points
         if not any(
             _has_time_constant(m[1])
-            for m in there.members
+            for m in candidate.members
             if m not in self.best.members
         ):
             return at_points
-        nearer = self._refined(there)
-        self._nearer.append((there, nearer))
+        nearer = self._refined(candidate)
+        self._nearer.append((candidate, nearer))
         return max(at_points, self.evidence(nearer))
 
     def _predicted_evidence(self, less: Set, offer: Offer) -> float:
@@ -162,43 +171,43 @@ class Posterior:
     ) -> Set:
         """A set with an offer, also on the other triad if that is better."""
         cause = offer.member[0]
-        there = self.search.accept(less, offer)
+        best = self.search.offers.accept(less, offer)
         for other in offers:
             its = other.member[0]
             if its.name == cause.name and its.part != cause.part and its.part in parts:
-                both = self.search.accept(less, offer, other)
-                there = max([there, both], key=lambda s: s.score)
-        return there
+                both = self.search.offers.accept(less, offer, other)
+                best = max([best, both], key=lambda s: s.score)
+        return best
 
-    def evidence(self, there: Set) -> float:
+    def evidence(self, candidate: Set) -> float:
         """Log evidence of a set as if its causes were known, and their variants not."""
-        return self._without_chances(there.score, there.members)
+        return self._without_chances(candidate.score, candidate.members)
 
     def _without_chances(self, score: float, members: Sequence[Member]) -> float:
         """A score without the prior of its causes; variants are equally probable."""
         counts = sum(
             np.log(self._variants_by_name[c.name_and_part]) for c, _ in members
         )
-        return score - self.search.set_log_prior(members) - float(counts)
+        return score - self.sets.set_log_prior(members) - float(counts)
 
     @cached_property
     def _variants_by_name(self) -> Counter[tuple[str, str]]:
         """Number of variants of all causes that differ only in their position."""
         counts = Counter[tuple[str, str]]()
-        for cause in self.search.dictionary.causes:
+        for cause in self.sets.dictionary.causes:
             counts[cause.name_and_part] += len(cause.variants)
         return counts
 
     def _kind(self, name: str) -> str:
         """Kind of a cause, by its name."""
-        causes = self.search.dictionary.causes
+        causes = self.sets.dictionary.causes
         return next(c.kind for c in causes if c.name == name)
 
     @cached_property
     def weights(self) -> list[tuple[Set, float]]:
         """Visited sets with their probabilities."""
-        sets = [*self.search.visited.values(), *(s for _, s in self._nearer)]
-        score: Array = np.array([self.search.corrected_score(s) for s in sets])
+        sets = [*self.sets.visited.values(), *(s for _, s in self._nearer)]
+        score: Array = np.array([self.sets.corrected_score(s) for s in sets])
         share = np.exp(score - score.max())
         share /= share.sum()
         return list(zip(sets, share.tolist(), strict=True))
@@ -209,10 +218,10 @@ class Posterior:
 
         Columns of refined sets are not in the dictionary.
         """
-        kept = len(self.search.visited)
+        kept = len(self.sets.visited)
         out = dict(self.weights[:kept])
-        for (there, _), (_, p) in zip(self._nearer, self.weights[kept:], strict=True):
-            out[there] += p
+        for (on_grid, _), (_, p) in zip(self._nearer, self.weights[kept:], strict=True):
+            out[on_grid] += p
         return list(out.items())
 
     @property

@@ -13,23 +13,22 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.posterior.mixture import Mixing
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.set_at_instability import with_typical_calibration
 
 
-def average_over_sizes(search: Search, there: Set) -> Set:
+def average_over_sizes(sets: Sets, fitted: Set) -> Set:
     """A set with the mean and covariance of the mixture in its state."""
-    wide, _ = search.with_typical_calibration(there)
-    before = there.state
-    state = Eliminated.of(before.rows, before.columns, wide)
-    opened = replace(there, state=state)
-    if len(np.unique(before.columns)) < len(before.columns) or not len(wide):
-        return opened  # a column of two groups has one estimate for each
-    mixing = Mixing(
-        search.dictionary, search.gram, opened, search.typical_instability, False
-    )
-    found = mixing.run()
-    half = np.linalg.cholesky(found.covariance).T
-    state = replace(state, half=half, estimate=found.mean)
-    return replace(there, state=state)
+    prior_sigma, _ = with_typical_calibration(sets.dictionary, fitted)
+    columns = fitted.state.columns
+    state = Eliminated.of(fitted.state.rows, columns, prior_sigma)
+    widened = replace(fitted, state=state)
+    if len(np.unique(columns)) < len(columns) or not len(columns):
+        return widened  # a column of two groups has one estimate for each
+    mixture = Mixing(
+        sets.dictionary, sets.gram, widened, sets.typical_instability, False
+    ).run()
+    half = np.linalg.cholesky(mixture.covariance).T
+    state = replace(state, half=half, estimate=mixture.mean)
+    return replace(fitted, state=state)

@@ -27,25 +27,27 @@ def sets_at_other_time_constants(found: InferenceResult) -> list[Set]:
 
     Empty if it has no time constant, or none with a known sigma.
     """
-    some = [
+    constants = [
         (i, name, min(group.shape_sigma / value, MAX_LOG_SIGMA))
         for i, (_, group) in enumerate(found.best.members)
         for name, value in group.shape.items()
         if np.isfinite(group.shape_sigma)
     ]
-    if not some:
+    if not constants:
         return []
     moved = []
-    inference = found.inference.independent_copy(found)
-    for i, name, sigma in some:
+    fit = found.independent_fit()
+    for i, name, sigma in constants:
         cause, group = found.best.members[i]
-        steps = np.sqrt(len(some)) * sigma * np.array([-1.0, 1.0])
+        steps = np.sqrt(len(constants)) * sigma * np.array([-1.0, 1.0])
         values = group.shape[name] * np.exp(steps)  # (1)
-        cause, groups = inference.variants_near(cause, group, values.tolist())
-        for one in groups:
+        cause, groups = fit.variants_near(cause, group, values.tolist())
+        for variant in groups:
             members = list(found.best.members)
-            members[i] = (cause, one)
+            members[i] = (cause, variant)
             moved.append(tuple(members))
-    search = inference.search_among(found.state, found.values, moved)
+    sets = fit.sets_with_columns_of(found.state, found.values, moved)
     sizes = found.best.sizes
-    return [average_over_sizes(search, search.evaluate(one, sizes)) for one in moved]
+    return [
+        average_over_sizes(sets, sets.evaluate(variant, sizes)) for variant in moved
+    ]

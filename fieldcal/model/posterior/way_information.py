@@ -25,13 +25,13 @@ MIN_EIGENVALUE = 1e-6
 
 
 def way_information(
-    found: Set, turned: Sequence[TurnRows], wanted: Index
+    fitted: Set, turned: Sequence[TurnRows], wanted: Index
 ) -> tuple[Array, Array]:
     """Rows (1) of some columns.
 
     Parameters
     ----------
-    found : set with the columns and their sizes
+    fitted : set with the columns and their sizes
     turned : rows of the turns
     wanted : (k,) columns
 
@@ -40,8 +40,8 @@ def way_information(
     (m, k) design and (m,) values, m <= k: none if the turns have no information
 
     """
-    columns, first = np.unique(found.state.columns, return_index=True)
-    sizes = found.state.prior_sigma[first]
+    columns, first = np.unique(fitted.state.columns, return_index=True)
+    sizes = fitted.state.prior_sigma[first]
     parts = [_way_design(t, columns) for t in turned]
     design = np.vstack([np.zeros((0, len(columns))), *parts])
     white = np.concatenate([np.zeros(0), *(t.way for t in turned)])
@@ -65,7 +65,7 @@ def way_information(
 def _way_design(turn: TurnRows, columns: Index) -> Array:
     """Design of the way of a turn by all columns of a set, (r, all)."""
     out = np.zeros((len(turn.way), len(columns)))
-    there = np.isin(turn.columns, columns)
-    at = np.searchsorted(columns, turn.columns[there])
-    out[:, at] = turn.way_design[:, there]
+    shared = np.isin(turn.columns, columns)
+    at = np.searchsorted(columns, turn.columns[shared])
+    out[:, at] = turn.way_design[:, shared]
     return out

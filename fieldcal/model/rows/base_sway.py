@@ -90,36 +90,42 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
     if not _on_known_positions(about) or gyroscopes.any() != gyroscopes.all():
         return None
     scale, windows = about.nominal["gyr_scale"], window_bounds(block, about)
-    found = {
-        p: some
+    waves_by_position = {
+        p: waves
         for p, (a, b) in enumerate(windows)
-        if b > a and (some := find_sway(block.t[a:b], block[a:b].six, scale))
+        if b > a and (waves := find_sway(block.t[a:b], block[a:b].six, scale))
     }
-    if len(found) < MIN_SWAYING_SHARE * len(windows):
+    if len(waves_by_position) < MIN_SWAYING_SHARE * len(windows):
         return None
     sizes = np.array(
-        [np.mean([w.mean_squares for w in some], axis=0) for some in found.values()]
+        [
+            np.mean([w.mean_squares for w in waves], axis=0)
+            for waves in waves_by_position.values()
+        ]
     )
     amplitude = np.sqrt(2 * sizes[:, 0])
     if np.sqrt((amplitude**2).mean()) < MIN_SWAY_RAD:
         return None
     hz = np.sqrt(sizes[:, 1] / sizes[:, 0]) / (2 * np.pi)
     lost = about.gravity * float(sizes[:, 0].mean()) / 2  # <phi^2> / 2 of gravity
-    left = np.array([
-        sum(w.excess_variance for w in found[p]) / len(found[p]) ** 2 if p in found
-        else _unseen_sway_variance(sizes.mean(axis=0), block.t[a:b], about.gravity)
-        for p, (a, b) in enumerate(windows)
-    ])  # fmt: skip
-    root = np.sqrt(max(len(found) - 1, 1))
-    noise = [w.noise * w.length for some in found.values() for w in some]
+    left: list[Array] = []
+    for p, (a, b) in enumerate(windows):
+        if p in waves_by_position:
+            excess = [w.excess_variance for w in waves_by_position[p]]
+            left.append(sum(excess, np.zeros(6)) / len(excess) ** 2)
+        else:
+            size, t = sizes.mean(axis=0), block.t[a:b]
+            left.append(_unseen_sway_variance(size, t, about.gravity))
+    root = np.sqrt(max(len(waves_by_position) - 1, 1))
+    noise = [w.noise * w.length for waves in waves_by_position.values() for w in waves]
     return BaseSway(
-        _without_sway(block, windows, found, scale),
-        left,
+        _without_sway(block, windows, waves_by_position, scale),
+        np.array(left),
         np.sqrt(np.mean(noise, axis=0) * sampling_rate(block)),
         float(np.sqrt((amplitude**2).mean())),
         float(hz.mean()),
         (float(amplitude.std() / root), float(hz.std() / root)),
-        max(needed_seconds(w) for some in found.values() for w in some),
+        max(needed_seconds(w) for waves in waves_by_position.values() for w in waves),
         0.0 if gyroscopes.any() else lost,
     )
 
@@ -144,27 +150,30 @@ def _on_known_positions(about: Description) -> bool:
 def _without_sway(
     block: Block,
     windows: NDArray[np.intp],
-    found: dict[int, list[SwayWaves]],
+    waves_by_position: dict[int, list[SwayWaves]],
     scale: Array,
 ) -> Block:
     """Samples corrected to a base at rest."""
     six, rate = block.six, sampling_rate(block)
-    for p, some in found.items():
+    for p, of_window in waves_by_position.items():
         a, b = (int(i) for i in windows[p])
-        middles = [(u.span[1] + v.span[0]) / 2 for u, v in pairwise(some)]
+        middles = [(u.span[1] + v.span[0]) / 2 for u, v in pairwise(of_window)]
         edges = [a, *np.searchsorted(block.t, middles).tolist(), b]
-        for waves, (first, last) in zip(some, pairwise(edges), strict=True):
+        for waves, (first, last) in zip(of_window, pairwise(edges), strict=True):
             six[first:last] -= waves.outputs(block.t[first:last])
     few = max(1, round(ROTATION_STEP_S * rate))
     ordered = sorted((int(a), int(b), p) for p, (a, b) in enumerate(windows) if b > a)
     for (_, end, p), (start, _, q) in pairwise(ordered):
         if start - end < 4 * few:
             continue
-        if p in found:
-            turned = found[p][-1].turn_angle(block.t[end : end + 1])[0]
+        if p in waves_by_position:
+            turned = waves_by_position[p][-1].turn_angle(block.t[end : end + 1])[0]
             six[end + few : end + 2 * few, 3:] += turned * scale * rate / few
-        if q in found:
-            waves, last = found[q][0], start - 1 - round(WINDOW_MARGIN_S * rate)
+        if q in waves_by_position:
+            waves, last = (
+                waves_by_position[q][0],
+                start - 1 - round(WINDOW_MARGIN_S * rate),
+            )
             # the rate falls to rest from this sample to the next one
             turned = waves.turn_angle(block.t[last : last + 2].mean(keepdims=True))[0]
             six[last + 1 : start, 3:] -= waves.outputs(block.t[last + 1 : start])[:, 3:]

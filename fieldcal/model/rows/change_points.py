@@ -30,19 +30,19 @@ sine of any frequency comes to 12.7 at most, a ramp to 7.9."""
 
 def change_points(rows: Rows) -> Array:
     """The instant between rows at which each output changes most, (k,) s, k <= 6."""
-    found: dict[int, tuple[float, float]] = {}
+    largest: dict[int, tuple[float, float]] = {}
     for window in _windows(rows):
         for c in range(6):
-            some = window[rows.used[window, c]]
+            used = window[rows.used[window, c]]
             for m in ROWS_BESIDE:
-                if len(some) < 2 * m:
+                if len(used) < 2 * m:
                     break
-                size = _changes(rows.y[some, c], rows.sd[some, c] ** 2, m)
+                size = _changes(rows.y[used, c], rows.sd[used, c] ** 2, m)
                 k = int(np.argmax(size))
-                best = found.get(c, (0.0, 0.0))
-                at = _between(rows, some[k + m - 1], some[k + m])
-                found[c] = max(best, (float(size[k]), at))
-    return np.unique([at for _, at in found.values()])
+                best = largest.get(c, (0.0, 0.0))
+                at = _between(rows, used[k + m - 1], used[k + m])
+                largest[c] = max(best, (float(size[k]), at))
+    return np.unique([at for _, at in largest.values()])
 
 
 def clear_jumps(rows: Rows) -> list[tuple[float, float]]:
@@ -50,21 +50,21 @@ def clear_jumps(rows: Rows) -> list[tuple[float, float]]:
 
     Of each output of a window the largest.
     """
-    found, m = set[tuple[float, float]](), ROWS_BESIDE[-1]
+    jumps, m = set[tuple[float, float]](), ROWS_BESIDE[-1]
     for window in _windows(rows):
         for c in range(6):
-            some = window[rows.used[window, c]]
-            if len(some) < 2 * m + 1:
+            used = window[rows.used[window, c]]
+            if len(used) < 2 * m + 1:
                 continue
-            beside = np.lib.stride_tricks.sliding_window_view(rows.y[some, c], m)
+            beside = np.lib.stride_tricks.sliding_window_view(rows.y[used, c], m)
             before, after = beside[: -m - 1], beside[m + 1 :]  # a row lies between
             scatter = (before.var(axis=1, ddof=1) + after.var(axis=1, ddof=1)) / m
             change = after.mean(axis=1) - before.mean(axis=1)
             k = int(np.argmax(np.abs(change) - CLEAR_JUMP_SIGMAS * np.sqrt(scatter)))
             if abs(change[k]) > CLEAR_JUMP_SIGMAS * np.sqrt(scatter[k]):
-                start, end = rows.span[some[k + m]].tolist()
-                found.add((start, end))
-    return sorted(found)
+                start, end = rows.span[used[k + m]].tolist()
+                jumps.add((start, end))
+    return sorted(jumps)
 
 
 def _windows(rows: Rows) -> list[Index]:
@@ -76,7 +76,7 @@ def _windows(rows: Rows) -> list[Index]:
 def _changes(y: Array, variance: Array, m: int) -> Array:
     """Size of the change behind each of the rows m - 1 to n - m - 1, (1)."""
     mean, spread = (
-        np.convolve(some, np.full(m, 1 / m), "valid") for some in (y, variance)
+        np.convolve(values, np.full(m, 1 / m), "valid") for values in (y, variance)
     )
     size: Array = np.abs(mean[m:] - mean[:-m]) / np.sqrt((spread[m:] + spread[:-m]) / m)
     return size

@@ -107,12 +107,16 @@ class Bands:
         loud = np.average(raw, axis=1, weights=np.minimum(free, MIN_BAND_COEFFICIENTS))
         even = (square * np.exp(-loud)[:, None]).sum(axis=0) / free.sum(axis=0)
         apart = np.diff(self.place[1:])
-        both = _smooth(
+        shape = _smooth(
             np.log(np.maximum(even, MIN_POWER)), free.sum(axis=0), apart, None
         )
         return [
-            self._with_mean_level(_smooth(one, some, apart, both + by))
-            for one, some, by in zip(raw, free, loud, strict=True)
+            self._with_mean_level(
+                _smooth(channel_raw, channel_free, apart, shape + mean_level)
+            )
+            for channel_raw, channel_free, mean_level in zip(
+                raw, free, loud, strict=True
+            )
         ]
 
     def _with_mean_level(self, level: Array) -> Array:

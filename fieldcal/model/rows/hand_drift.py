@@ -64,9 +64,9 @@ def force_turn_rate(acc: Array, length: float) -> ForceTurn:
     if len(t) < MIN_SAMPLES:
         return ForceTurn(0.0, np.inf)
     t -= t.mean()
-    some = acc[known]
-    mean = some.mean(axis=0)
-    size, off = float(np.linalg.norm(mean)), some - mean
+    measured = acc[known]
+    mean = measured.mean(axis=0)
+    size, off = float(np.linalg.norm(mean)), measured - mean
     slope = t @ off / (t @ t)
     spread = ((off - np.outer(t, slope)) ** 2).sum(axis=0) / (len(t) - 2) / (t @ t)
     across = 1 - (mean / size) ** 2
@@ -86,14 +86,14 @@ def drift_factor(windows: list[ForceTurn], trembles: Array) -> float:
 
     """
     square, noise = np.array(windows).T
-    some = np.isfinite(noise) & (trembles > 0)
-    square, noise, trembles = square[some], noise[some], trembles[some]
+    usable = np.isfinite(noise) & (trembles > 0)
+    square, noise, trembles = square[usable], noise[usable], trembles[usable]
     k = WALKING_HAND_K
     for _ in range(MAX_STEPS):
         # the square of a normal rate about two axes scatters by itself
         info = 1 / (noise + k * trembles) ** 2
-        told = float(info @ trembles**2)
-        seen = float(info @ (trembles * (square - noise)))
-        k = (seen + 1 / WALKING_HAND_K) / (told + 1 / WALKING_HAND_K**2)
+        squares = float(info @ trembles**2)
+        product = float(info @ (trembles * (square - noise)))
+        k = (product + 1 / WALKING_HAND_K) / (squares + 1 / WALKING_HAND_K**2)
         k = max(k, STEADY_HAND_K)
     return k

@@ -83,19 +83,19 @@ def rows_of_recording(source: RowSource) -> Rows:
         _noise_beside_tremor(rows, pieces, rounding_noise(block, bound)),
     )
     if angle or noise is not None:
-        one = _add_hand_motion(
+        in_hand = _add_hand_motion(
             source, reduce_to_rows(source, whole=True, level=noise), angle
         )
-        pushed = (rows.noise[:3] > PUSHED_NOISE_RATIO * one.noise[:3]).any()
-        return one if angle or pushed else _separate_triads(source, one)
-    some = _trembling_windows(rows, pieces, source.rate)
-    if not some.any():
+        pushed = (rows.noise[:3] > PUSHED_NOISE_RATIO * in_hand.noise[:3]).any()
+        return in_hand if angle or pushed else _separate_triads(source, in_hand)
+    trembling = _trembling_windows(rows, pieces, source.rate)
+    if not trembling.any():
         return rows
-    still = rows.without(np.isin(rows.x.position, held[some]))
+    still = rows.without(np.isin(rows.x.position, held[trembling]))
     level = still.sd * np.sqrt(rows.length * source.rate)[:, None]
-    one = reduce_to_rows(source, whole=True, level=median_sigma(level))
-    unsteady = _add_hand_motion(source, replace(one, noise=rows.noise), 0.0)
-    return _add_angle_errors(source, unsteady, held[some])
+    in_hand = reduce_to_rows(source, whole=True, level=median_sigma(level))
+    unsteady = _add_hand_motion(source, replace(in_hand, noise=rows.noise), 0.0)
+    return _add_angle_errors(source, unsteady, held[trembling])
 
 
 def _add_hand_motion(source: RowSource, rows: Rows, angle: float) -> Rows:
@@ -131,17 +131,18 @@ def _add_hand_motion(source: RowSource, rows: Rows, angle: float) -> Rows:
     return replace(rows, sd=sd, hand_angle=most)
 
 
-def _separate_triads(source: RowSource, one: Rows) -> Rows:
+def _separate_triads(source: RowSource, in_hand: Rows) -> Rows:
     """Rows with blocks for the accelerometers, and whole windows for the gyroscopes.
 
-    The latter are those of `one`. For a table that trembles without turning the force.
+    The latter are those of `in_hand`. For a table that trembles without turning the
+    force.
     """
     rows = reduce_to_rows(source, apart=True)
     count = np.unique(rows.x.position, return_counts=True)[1]
     ends, sd = np.cumsum(count) - 1, rows.sd.copy()
-    sd[ends, 3:] = one.sd[:, 3:]
-    wander = np.repeat(one.hand_angle, count, axis=0)
-    return replace(rows, sd=sd, noise=one.noise, hand_angle=wander)
+    sd[ends, 3:] = in_hand.sd[:, 3:]
+    wander = np.repeat(in_hand.hand_angle, count, axis=0)
+    return replace(rows, sd=sd, noise=in_hand.noise, hand_angle=wander)
 
 
 def _add_angle_errors(source: RowSource, rows: Rows, shaky: Index) -> Rows:
@@ -175,11 +176,11 @@ def _trembling_windows(
     if len(pieces) < MIN_HELD_WINDOWS:
         return np.zeros(len(pieces), dtype=bool)
     shown = np.array([_relative_tremor(piece[:, GYR], rate) for piece in pieces])
-    told = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
-    if not told.any():
+    known = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
+    if not known.any():
         return np.zeros(len(pieces), dtype=bool)
-    sensors = np.quantile(shown[:, told], MIN_QUIET_SHARE, axis=0)
-    apart: NDArray[np.bool_] = (shown[:, told] / sensors).mean(
+    sensors = np.quantile(shown[:, known], MIN_QUIET_SHARE, axis=0)
+    apart: NDArray[np.bool_] = (shown[:, known] / sensors).mean(
         axis=1
     ) > LYING_NOISE_RATIO
     return apart
@@ -191,17 +192,17 @@ def _relative_tremor(rates: Array, rate: float) -> Array:
     nan for an axis without noise or without samples.
     """
     noise = _high_frequency_noise(rates)
-    some, unrest = np.isfinite(noise), np.full(3, np.nan)
-    if not some.any():
+    measured, unrest = np.isfinite(noise), np.full(3, np.nan)
+    if not measured.any():
         return unrest
     many = min(len(rates), max(round(rate), 8))
-    white = noise[some] ** 2 / rate * (many / rate) / 15
-    parts = np.array_split(rates[:, some], len(rates) // many)
+    white = noise[measured] ** 2 / rate * (many / rate) / 15
+    parts = np.array_split(rates[:, measured], len(rates) // many)
     nothing = np.zeros(len(white))
     turned = [_tremor_rms(part, len(part) / rate, nothing) ** 2 for part in parts]
     # a hand does so all the time, and a bump in a second or two
     usual = np.median(turned, axis=0)
-    unrest[some] = usual / np.where(white > 0, white, np.nan)
+    unrest[measured] = usual / np.where(white > 0, white, np.nan)
     return unrest
 
 
@@ -211,9 +212,9 @@ def _high_frequency_noise(rates: Array) -> Array:
     nan for an axis without samples.
     """
     out = np.full(3, np.nan)
-    some = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
-    if some.any():
-        out[some] = quickest_noise([rates[:, some]])
+    measured = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
+    if measured.any():
+        out[measured] = quickest_noise([rates[:, measured]])
     return out
 
 
@@ -262,8 +263,8 @@ def force_wander_angle(rows: Rows) -> float:
 
     A course that all windows share is subtracted: outputs that settle make one.
     """
-    x, some = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
-    held = [some & (x.position == p) for p in np.unique(x.position[some])]
+    x, usable = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
+    held = [usable & (x.position == p) for p in np.unique(x.position[usable])]
     held = [at for at in held if at.sum() > 1]
     if len(held) < MIN_HELD_WINDOWS:
         return 0.0

@@ -26,8 +26,8 @@ def lean_modes(rows: Rows) -> Index:
     free = rows.used[:, :3].all(axis=1) & ~rows.x.oriented & (rows.x.position >= 0)
     out = np.zeros(int(rows.x.position.max(initial=-1)) + 1, dtype=np.intp)
     for p in np.unique(rows.x.position[free]):
-        some = free & (rows.x.position == p)
-        out[p] = _modes(rows.y[some, :3], rows.sd[some, :3])
+        inside = free & (rows.x.position == p)
+        out[p] = _modes(rows.y[inside, :3], rows.sd[inside, :3])
     return out
 
 

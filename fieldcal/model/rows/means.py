@@ -19,8 +19,8 @@ from fieldcal.model.rows.window_bounds import window_bounds
 
 def median_sigma(sigma: Array) -> Array:
     """Median of each channel's (p, 6) over the positions that have one, (6,)."""
-    known = [one[np.isfinite(one)] for one in sigma.T]
-    return np.array([np.median(one) if len(one) else np.nan for one in known])
+    known = [axis[np.isfinite(axis)] for axis in sigma.T]
+    return np.array([np.median(axis) if len(axis) else np.nan for axis in known])
 
 
 def rows_of_means(source: RowSource, sigma: Array) -> Rows:

@@ -138,15 +138,15 @@ class MotionRows:
         apart = values.reshape(-1, self.length, values.shape[1])
         out = dct(apart, axis=1, norm="ortho")  # (2)
         out[:, 0] = dct(out[:, 0], axis=0, norm="ortho")
-        both: Array = out.reshape(values.shape)
-        return both
+        cosines: Array = out.reshape(values.shape)
+        return cosines
 
-    def select_stretches(self, coefficients: Array, some: Index) -> Array:
+    def select_stretches(self, coefficients: Array, stretches: Index) -> Array:
         """Coefficients (m, k) of some stretches alone, of those (n, k) of all."""
         apart = coefficients.reshape(-1, self.length, coefficients.shape[1])
         means = idct(apart[:, 0], axis=0, norm="ortho")
-        out = apart[some].copy()
-        out[:, 0] = dct(means[some], axis=0, norm="ortho")
+        out = apart[stretches].copy()
+        out[:, 0] = dct(means[stretches], axis=0, norm="ortho")
         return out.reshape(-1, coefficients.shape[1])
 
     def motion(self, response: Response, order: int = 0) -> Array:
@@ -286,10 +286,10 @@ def _stamp_errors(t: Array, stretches: Sequence[Index]) -> Array:
     Samples of a stretch are counted, so what was lost in it makes it uneven.
     """
     off = [np.empty(0)]
-    for some in stretches:
-        if len(some):
-            count = np.arange(len(some)) - (len(some) - 1) / 2
-            stamps = t[some] - t[some].mean()
+    for stretch in stretches:
+        if len(stretch):
+            count = np.arange(len(stretch)) - (len(stretch) - 1) / 2
+            stamps = t[stretch] - t[stretch].mean()
             off.append(stamps - count * (count @ stamps) / max(count @ count, 1.0))
     out: Array = np.concatenate(off)
     step = float(np.median(np.diff(t)))

@@ -240,8 +240,9 @@ def average_rows(
     block = source.block
     y, count = block_means(masked(block, source.usable), bound)
     sd = level / np.sqrt(np.maximum(count, 1))
-    told = (count > 0) & (sd > 0)  # an output that never changes has no information
-    sd = np.where(told, sd, np.nan)
+    # an output that never changes has no information
+    informative = (count > 0) & (sd > 0)
+    sd = np.where(informative, sd, np.nan)
     span = np.column_stack([block.t[bound[:, 0]], block.t[bound[:, 1] - 1]])
     length = np.diff(bound, axis=1)[:, 0] / sampling_rate(block)
     x = _experience(source, position, y, span.mean(axis=1), length, variance)

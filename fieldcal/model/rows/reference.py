@@ -64,8 +64,8 @@ class Reference:
     @property
     def missing_channels(self) -> Index:
         """Missing channels of triads that are not missing altogether."""
-        some = np.repeat(self.observed.reshape(2, 3).any(axis=1), 3)
-        return np.flatnonzero(some & ~self.observed)
+        observed = np.repeat(self.observed.reshape(2, 3).any(axis=1), 3)
+        return np.flatnonzero(observed & ~self.observed)
 
     def at(self, s: Array, order: int = 0) -> Array:
         """The six channels, or a derivative, at instants of its clock, (n, 6)."""

@@ -60,5 +60,5 @@ def _last_motion(gap: Array, held: Array, noise: Array, m: int) -> int:
 def window_starts(source: RowSource) -> Array:
     """Start of each window, (p,) s; of a position without one, the start of rest."""
     windows = source.about.windows
-    given = [np.nan if w is None else w[0] for w in windows] or [source.block.t[0]]
-    return np.where(np.isnan(given), source.rest_began, given)
+    starts = [np.nan if w is None else w[0] for w in windows] or [source.block.t[0]]
+    return np.where(np.isnan(starts), source.rest_began, starts)

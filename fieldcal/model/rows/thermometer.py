@@ -200,6 +200,6 @@ def _slope_of_run(t: Array, y: Array, weight: Array, half: float) -> Array:
     scale = half ** np.add.outer(np.arange(3), np.arange(3))
     left = moments[:, np.add.outer(np.arange(3), np.arange(3))] / scale
     left += RIDGE * left[:, :1, :1] * np.eye(3)
-    found = np.linalg.solve(left, right / half ** np.arange(3)[:, None])
-    out: Array = found[:, 1, 0] / half
+    coefficients = np.linalg.solve(left, right / half ** np.arange(3)[:, None])
+    out: Array = coefficients[:, 1, 0] / half
     return out

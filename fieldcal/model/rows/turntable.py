@@ -146,10 +146,10 @@ def _bias_from_norms(w: Array, length: Array) -> tuple[Array, bool]:
     size = float(np.abs(w).max(initial=1e-12))
     design = np.column_stack([2 * w / size, -np.ones(len(w))])
     squares = (np.sum(w**2, axis=1) - length**2) / size**2
-    found, _, rank, _ = np.linalg.lstsq(design, squares, MIN_AXES_SPREAD)
+    solution, _, rank, _ = np.linalg.lstsq(design, squares, MIN_AXES_SPREAD)
     if rank < design.shape[1]:
         return np.zeros(3), False
-    return size * found[:3], True
+    return size * solution[:3], True
 
 
 def fit_rotating_earth_rate(
@@ -182,15 +182,15 @@ def fit_rotating_earth_rate(
     means = np.broadcast_to(np.eye(3), (int(used.sum()), 3, 3))
     design = np.concatenate([means, shape[used]], axis=2) * weight[:, :, None]
     design = design.reshape(-1, 5)
-    found, _, rank, _ = np.linalg.lstsq(design, (gyr[used] * weight).ravel(), 1e-6)
+    solution, _, rank, _ = np.linalg.lstsq(design, (gyr[used] * weight).ravel(), 1e-6)
     if rank < design.shape[1]:
         return none
     covariance = np.linalg.inv(design.T @ design)[3:, 3:]
     sigma = float(np.sqrt(covariance.diagonal().max()))
-    if np.linalg.norm(found[3:]) > EARTH_RATE + EARTH_RATE_SIGMAS * sigma:
+    if np.linalg.norm(solution[3:]) > EARTH_RATE + EARTH_RATE_SIGMAS * sigma:
         return none
     mean = shape[used].mean(axis=0)
-    return RotatingEarthRate(shape @ found[3:], mean @ covariance @ mean.T)
+    return RotatingEarthRate(shape @ solution[3:], mean @ covariance @ mean.T)
 
 
 def _unseen_rate_covariance(axis: Array, turned: float) -> Array:

@@ -71,9 +71,9 @@ def measure_window_noise(
     six = block.six if loud.any() else np.empty((0, 6))
     for i in np.flatnonzero(loud).tolist():
         a, b = windows[i]
-        seen = np.isfinite(block.acc[a:b]).any(axis=0)
+        measured = np.isfinite(block.acc[a:b]).any(axis=0)
         variance[i] = 0.0
-        variance[i, seen] = np.nanvar(block.acc[a:b, seen], axis=0)
+        variance[i, measured] = np.nanvar(block.acc[a:b, measured], axis=0)
         six[a:b] = without_lines(six[a:b], rate_hz)
     if loud.any():
         block = replace(block, acc=six[:, :3], gyr=six[:, 3:])

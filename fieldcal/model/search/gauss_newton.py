@@ -12,18 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Gram
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Member, Sizes
-from fieldcal.model.search.selection import Search
-from fieldcal.model.state import State, Term
-from fieldcal.model.system.fitted import estimates_by_column
+from fieldcal.model.search.estimated_state import columns_in_state, state_at_estimate
+from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import System, gram
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turn
-from fieldcal.physics.effect import Motion, Sensor
 
 MAX_NEWTON_STEPS = 6
 """Steps of Gauss and Newton for one set."""
@@ -41,6 +40,10 @@ class GaussNewton:
     nominal : nominal state
     turns : makes the rows of turns; None if there are no turns
 
+    Attributes
+    ----------
+    turn_rows : rows of the turns about the state where they were last linearised
+
     """
 
     def __init__(
@@ -49,6 +52,12 @@ class GaussNewton:
         self.system, self.nominal, self.turns = system, nominal, turns
         self.dictionary: Dictionary = system.dictionary
         self.turn_rows: list[TurnRows] = []
+
+    def independent_copy(self, turn_rows: Sequence[TurnRows]) -> GaussNewton:
+        """A copy to which columns can be added; it keeps the given rows of turns."""
+        fit = GaussNewton(self.system.independent_copy(), self.nominal)
+        fit.turn_rows = list(turn_rows)
+        return fit
 
     def pad(self, values: Array) -> Array:
         """Values of columns, padded with zeros for columns that were added since."""
@@ -72,20 +81,23 @@ class GaussNewton:
             self.turn_rows = self.turns.linearised(state, values, linear, known)
         return gram(linear, self.dictionary, values, self.turn_rows)
 
-    def follow_turns(self, state: State, values: Array) -> None:
-        """Update the rows of turns about a state, without the accelerometers' rows."""
-        if self.turns is None:
-            return
-        free = self.dictionary.unoriented.any()  # else turns end at known attitudes
-        linear = self.system.linearised(state) if free else []
-        self.turn_rows = self.turns.linearised(state, self.pad(values), linear, None)
-
     def gram_of(
         self, linear: Sequence[LinearRows], values: Array, wanted: NDArray[np.bool_]
     ) -> Gram:
         """Gram matrix of some columns from linearised rows, with the current turns."""
-        d, some = self.dictionary, np.flatnonzero(wanted)
-        return gram(linear, d, self.pad(values), self.turn_rows, some)
+        columns = np.flatnonzero(wanted)
+        return gram(linear, self.dictionary, self.pad(values), self.turn_rows, columns)
+
+    def sets_with_columns_of(
+        self, state: State, values: Array, candidates: Sequence[tuple[Member, ...]]
+    ) -> Sets:
+        """Sets over the rows about a state, with only the columns of some sets."""
+        values = self.pad(values)
+        wanted = values != 0
+        for members in candidates:
+            wanted = wanted | self.wanted_columns(members)
+        linear = self.system.linearised(state, wanted)
+        return Sets(self.dictionary, self.gram_of(linear, values, wanted))
 
     def settle(
         self,
@@ -100,39 +112,77 @@ class GaussNewton:
             wanted = self.wanted_columns(members) | (values != 0)
             linear = self.system.linearised(state, wanted)
             rows = self.gram_of(linear, values, wanted)
-            search = Search(self.dictionary, rows)
-            found = search.evaluate(members, sizes)
-            sizes = found.sizes
+            settled = Sets(self.dictionary, rows).evaluate(members, sizes)
+            sizes = settled.sizes
             before = values
-            state, values = self.state_at_estimate(found)
-            if self.largest_step(found, before, values) < CONVERGED:
+            state, values = self.state_at_estimate(settled)
+            if self.largest_step(settled, before, values) < CONVERGED:
                 break
-        return state, values, found
+        return state, values, settled
 
     def _near_set_angles(
         self, state: State, values: Array, members: Sequence[Member]
     ) -> tuple[State, Array]:
         """The state with new members that are angles begun near where they are."""
         new = [g for c, g in members if c.position >= 0 and not values[g.columns].any()]
-        turns = [self.system.starting_angles(self.nominal, g.position) for g in new]
-        if not any(turn.any() for turn in turns):
+        angles = [self.system.starting_angles(self.nominal, g.position) for g in new]
+        if not any(angle.any() for angle in angles):
             return state, values
         values, small = values.copy(), state.small_rotation.copy()
-        for group, turn in zip(new, turns, strict=True):
-            values[group.columns] = small[group.position] = turn
+        for group, angle in zip(new, angles, strict=True):
+            values[group.columns] = small[group.position] = angle
         return replace(state, small_rotation=small), values
 
-    def largest_step(self, found: Set, before: Array, values: Array) -> float:
+    def state_at_estimate(self, fitted: Set) -> tuple[State, Array]:
+        """The state at a set's estimate, and its columns' values."""
+        return state_at_estimate(self.dictionary, self.nominal, fitted)
+
+    def largest_step(self, fitted: Set, before: Array, values: Array) -> float:
         """Largest change of the state's parameters, in their standard deviations."""
-        error = np.sqrt(np.maximum(np.diag(found.state.inverse), 1e-300))
-        step = np.abs(values - self.pad(before))[found.state.columns] / error
-        counted = np.isin(found.state.columns, self._nonlinear(found.members))
+        error = np.sqrt(np.maximum(np.diag(fitted.state.inverse), 1e-300))
+        step = np.abs(values - self.pad(before))[fitted.state.columns] / error
+        in_state = columns_in_state(self.dictionary, fitted.members)
+        counted = np.isin(fitted.state.columns, in_state)
         return float(step[counted].max(initial=0.0))
 
-    def _nonlinear(self, members: tuple[Member, ...]) -> Array:
-        """Columns whose estimates the state contains."""
-        groups = [*self.dictionary.always, *(g for _, g in members)]
-        return np.concatenate([g.columns for g in groups if g.in_state])
+    def variants_near(
+        self, cause: Cause, group: Group, values: Sequence[float]
+    ) -> tuple[Cause, list[Group]]:
+        """A cause with variants of a group at some values of its shape, and these.
+
+        Existing variants are reused. In the rows of turns, new ones have the columns of
+        the group.
+        """
+        (name,) = group.shape
+        known = {g.shape[name]: g for g in group.with_same_parameters(cause.variants)}
+        missing = [v for v in values if v not in known]
+        cause, added = self.dictionary.add_shape_values(cause, group, missing)
+        for variant in added:
+            self.copy_turn_columns(group, variant)
+        known |= dict(zip(missing, added, strict=True))
+        return cause, [known[v] for v in values]
+
+    def copy_turn_columns(self, group: Group, variant: Group) -> None:
+        """Give a new variant the columns of a group in the rows of turns."""
+        self.turn_rows = [
+            rows.with_copied_columns(group.columns, variant.columns)
+            for rows in self.turn_rows
+        ]
+
+    def follow_turns(self, state: State, values: Array) -> None:
+        """Update the rows of turns about a state, without the accelerometers' rows."""
+        if self.turns is None:
+            return
+        free = self.dictionary.unoriented.any()  # else turns end at known attitudes
+        linear = self.system.linearised(state) if free else []
+        self.turn_rows = self.turns.linearised(state, self.pad(values), linear, None)
+
+    @property
+    def contradicted_turns(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of windows whose attitudes contradict the gyroscopes."""
+        return (
+            () if self.turns is None else tuple(self.turns.tracker.contradicted_turns)
+        )
 
     def turns_at(self, state: State) -> list[Turn]:
         """The turns integrated with a state."""
@@ -149,35 +199,3 @@ class GaussNewton:
             if any(t.effect is g.effect for _, g in members)
         )  # fmt: skip
         yield from self.turns.outputs_of_terms(turns, state, terms)
-
-    def state_at_estimate(self, found: Set) -> tuple[State, Array]:
-        """The state at a set's estimate, and its columns' values."""
-        d = self.dictionary
-        kept = np.zeros(d.width, dtype=bool)
-        kept[self._nonlinear(found.members)] = True
-        if d.unoriented.any():
-            kept[d.rotations] = True
-        values = np.where(kept, estimates_by_column(found.state, d), 0.0)
-        nominal = self.nominal
-        terms = [Term(t.effect, t.values, t.shape, t.origin) for t in nominal.terms]
-        for _, group in found.members:
-            if group.effect is None or not isinstance(group.effect, Motion | Sensor):
-                continue
-            full = np.zeros(len(group.effect.params))
-            full[list(group.params)] = values[group.columns]
-            terms.append(Term(group.effect, full, group.shape, group.origin))
-        state = State(
-            nominal.bias + values[d.bias : d.bias + 6],
-            nominal.scale + values[d.scale : d.scale + 6],
-            values[d.rotations].reshape(-1, 2),
-            values[d.earth : d.earth + 3] if d.earth >= 0 else np.zeros(3),
-            tuple(terms),
-            *self._attitude(values),
-        )
-        return state, values
-
-    def _attitude(self, values: Array) -> Iterator[Array]:
-        """Errors of measured attitudes, (p, 3), if there are any."""
-        d = self.dictionary
-        if d.attitude >= 0:
-            yield values[d.attitude : d.attitude + 3 * d.position_count].reshape(-1, 3)

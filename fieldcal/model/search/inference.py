@@ -7,22 +7,21 @@ with that set. It may also begin with an explanation of a part of the recording.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.gravity import G0
-from fieldcal.core.samples import GYR, Array
-from fieldcal.model import priors
-from fieldcal.model.evidence.gram import Gram
-from fieldcal.model.evidence.sets import Set, SetKey
+from fieldcal.core.samples import Array
+from fieldcal.model.evidence.sets import Set, SetKey, Sets
 from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportional_offsets import proportional_causes
 from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import MIN_LOG_RISE, Search
+from fieldcal.model.search.starting_sets import starting_sets
+from fieldcal.model.search.variations import drop_superfluous
 from fieldcal.model.state import State
-from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.turn_rows import TurnRows
 
 MAX_LINEARISATIONS = 8
@@ -35,9 +34,6 @@ MAX_KEPT_STEP = 1.0
 """Largest step of a column, in standard deviations, after which rows of turns need not
 be linearised again."""
 
-LARGE_INSTABILITY = 4.0
-"""Instability, in typical ones, above which causes may hide that show only together."""
-
 
 @dataclass(frozen=True, slots=True)
 class InferenceResult:
@@ -45,7 +41,7 @@ class InferenceResult:
 
     Attributes
     ----------
-    inference : that found it
+    fit : linearises the rows of the session
     search : about the last state
     best : the set of the highest weight
     state : its estimate
@@ -56,7 +52,7 @@ class InferenceResult:
 
     """
 
-    inference: Inference
+    fit: GaussNewton
     search: Search
     best: Set
     state: State
@@ -65,19 +61,36 @@ class InferenceResult:
     contradicted_turns: tuple[tuple[int, int], ...]
     visited_keys: frozenset[SetKey]
 
+    def independent_fit(self) -> GaussNewton:
+        """A copy of the fit about this result, to which columns can be added."""
+        return self.fit.independent_copy(self.turn_rows)
 
-def visible_angle(gram: Gram) -> float:
-    """Smallest angle whose square the accelerometers show, rad.
+    def with_refined_shapes(self, visited: Set) -> Set:
+        """A visited set with its shapes refined, except those that `best` contains.
 
-    Half of it, times gravity, is as large as the noise of a window's mean.
+        The columns that this needs are added to a copy of the dictionary.
+        """
+        fit = self.independent_fit()
+        refinement = Refinement(fit, self.state, self.values, visited.sizes)
+        members, refined = visited.members, [g for _, g in self.best.members]
+        for i, (_, group) in enumerate(members):
+            if group.shape and group.effect is not None and group not in refined:
+                members = refinement.refine_shape(members, [i])
+        sets = fit.sets_with_columns_of(self.state, self.values, [members])
+        return sets.evaluate(members, visited.sizes)
+
+
+class Inference:
+    """The inference of one session.
+
+    Parameters
+    ----------
+    fit : linearises the rows of the session, and fits sets
+
     """
-    info = gram.info[gram.kind < GYR.start]
-    sigma = 1 / np.sqrt(np.median(info[info > 0])) if info.any() else np.inf
-    return float(np.sqrt(2 * sigma / G0))
 
-
-class Inference(Refinement):
-    """The inference of one session."""
+    def __init__(self, fit: GaussNewton) -> None:
+        self.fit = fit
 
     def run(self, begin: Sequence[Member] | None = None) -> InferenceResult:
         """Search until set and state no longer change.
@@ -88,16 +101,16 @@ class Inference(Refinement):
             starting states and the costly changes of sets are then not tried
 
         """
-        start: Array = np.zeros(self.dictionary.width)
-        state, values, _ = self.settle(self.nominal, start, ())
-        search = Search(self.dictionary, self.gram(state, values, None))
-        if begin is not None:
-            found = search.drop_superfluous(self.dictionary.match_members(begin))
-        if begin is None or (begin and not found.members):
-            state, values, found = self._search_from_nominal(state, values, search)
-        about = dict.fromkeys([found, search.evaluate(())])
-        self.dictionary.add_causes(proportional_causes(self.dictionary, list(about)))
-        return self._iterate(state, values, found, thorough=begin is None)
+        dictionary = self.fit.dictionary
+        state, values = self._state_without_causes()
+        search = self._search_about(state, values, None)
+        known = () if begin is None else dictionary.match_members(begin)
+        best = drop_superfluous(search.sets, known) if begin is not None else None
+        if best is None or (begin and not best.members):
+            state, values, best = self._search_from_nominal(state, values, search)
+        about = dict.fromkeys([best, search.sets.evaluate(())])
+        dictionary.add_causes(proportional_causes(dictionary, list(about)))
+        return self._iterate(state, values, best, thorough=begin is None)
 
     def resume(self, better: Set, before: InferenceResult) -> InferenceResult:
         """Continue from a better set than that of an earlier result.
@@ -105,154 +118,90 @@ class Inference(Refinement):
         It ends at a set that was visited before: sets of about equal weight would
         otherwise lead to each other in a cycle.
         """
-        start: Array = np.zeros(self.dictionary.width)
-        state, values, _ = self.settle(self.nominal, start, ())
+        state, values = self._state_without_causes()
         return self._iterate(state, values, better, False, before.visited_keys)
+
+    def _state_without_causes(self) -> tuple[State, Array]:
+        """The state at the estimate of the empty set, and its columns' values."""
+        zeros: Array = np.zeros(self.fit.dictionary.width)
+        state, values, _ = self.fit.settle(self.fit.nominal, zeros, ())
+        return state, values
+
+    def _search_about(self, state: State, values: Array, known: Set | None) -> Search:
+        """A search over all rows and columns, linearised about a state."""
+        gram = self.fit.gram(state, values, known)
+        return Search(Sets(self.fit.dictionary, gram))
 
     def _iterate(
         self,
         state: State,
         values: Array,
-        found: Set,
+        best: Set,
         thorough: bool,
-        been: frozenset[SetKey] = frozenset(),
+        visited_keys: frozenset[SetKey] = frozenset(),
     ) -> InferenceResult:
-        """Update the state and search in turn, starting from set `found`.
+        """Update the state and search in turn, starting from the set `best`.
 
-        If `thorough`, costly changes are tried once cheap ones find nothing. A set in
-        `been` ends it.
+        If `thorough`, costly changes are tried once cheap ones find nothing. A set
+        whose key is in `visited_keys` ends it.
         """
+        fit = self.fit
         members: tuple[Member, ...] = ()
-        seen = set(been)
-        passed: dict[tuple[Member, ...], None] = {}
+        visited = set(visited_keys)
+        earlier: dict[tuple[Member, ...], None] = {}
         for _ in range(MAX_LINEARISATIONS):
-            seen.add(Search.key(found.members))
-            if found.members != members:
-                state, values, _ = self.settle(
-                    state, values, found.members, found.sizes
-                )
-                members = self.refine_shapes(state, values, found.members, found.sizes)
-                # with the columns that are in the state now: those of the grid's
-                # points, estimated beside, would be taken off the way a second time
-                state, values, found = self.settle(state, values, members, found.sizes)
-            search = Search(self.dictionary, self.gram(state, values, found))
-            for before in passed:
-                search.evaluate(before)  # it may be as likely as what replaced it
-            passed[found.members] = None
-            found = search.run(members, thorough=False)
+            visited.add(Sets.key(best.members))
+            if best.members != members:
+                state, values, _ = fit.settle(state, values, best.members, best.sizes)
+                refinement = Refinement(fit, state, values, best.sizes)
+                members = refinement.refine_shapes(best.members)
+                # The columns of the shapes on the grid must leave the state. Otherwise
+                # what they explain is subtracted from the rows of turns twice.
+                state, values, best = fit.settle(state, values, members, best.sizes)
+            search = self._search_about(state, values, best)
+            for other in earlier:
+                search.sets.evaluate(other)  # it may be as likely as what replaced it
+            earlier[best.members] = None
+            best = search.run(members, thorough=False)
             same = frozenset(c.key for c, _ in members)
-            if thorough and found.keys == same:
-                found = search.run(members)
-            if found.keys == same:
-                own = search.evaluate(members, found.sizes)  # with its own shapes
+            if thorough and best.keys == same:
+                best = search.run(members)
+            if best.keys == same:
+                own = search.sets.evaluate(members, best.sizes)  # with its own shapes
                 # a point of the grid next to where a time constant was refined
-                back = Search.key(found.members) in seen
-                if found.score <= own.score + (
-                    TIME_CONSTANT_LOG_LOSS if back else MIN_LOG_RISE
+                returned = Sets.key(best.members) in visited
+                if best.score <= own.score + (
+                    TIME_CONSTANT_LOG_LOSS if returned else MIN_LOG_RISE
                 ):
-                    found = own
-                    there, moved, _ = self.settle(state, values, members, found.sizes)
-                    if self.largest_step(found, values, moved) < MAX_KEPT_STEP:
+                    best = own
+                    next_state, next_values, _ = fit.settle(
+                        state, values, members, best.sizes
+                    )
+                    if fit.largest_step(best, values, next_values) < MAX_KEPT_STEP:
                         break
-                    state, values = there, moved
+                    state, values = next_state, next_values
                     continue
-            if Search.key(found.members) in seen:
+            if Sets.key(best.members) in visited:
                 break
-        astray = self.turns.tracker.contradicted_turns if self.turns is not None else ()
         return InferenceResult(
-            self, search, found, state, self.pad(values), self.turn_rows, tuple(astray),
-            frozenset(seen),
+            fit, search, best, state, fit.pad(values), fit.turn_rows,
+            fit.contradicted_turns, frozenset(visited),
         )  # fmt: skip
 
     def _search_from_nominal(
         self, state: State, values: Array, search: Search
     ) -> tuple[State, Array, Set]:
         """The best set about the nominal state, or about another starting set."""
-        best, turned = (state, values, search.run(thorough=False)), self.turn_rows
-        for begin in self._starting_sets(search, best[2]):
-            there, moved, _ = self.settle(state, values, begin.members, begin.sizes)
-            about = Search(self.dictionary, self.gram(there, moved, None))
-            found = about.run(begin.members, thorough=False)
-            if found.score > best[2].score:
-                best, turned = (there, moved, found), self.turn_rows
-        self.turn_rows = turned
+        best = (state, values, search.run(thorough=False))
+        turn_rows = self.fit.turn_rows
+        for start in starting_sets(self.fit, search, best[2]):
+            state_there, values_there, _ = self.fit.settle(
+                state, values, start.members, start.sizes
+            )
+            about = self._search_about(state_there, values_there, None)
+            candidate = about.run(start.members, thorough=False)
+            if candidate.score > best[2].score:
+                best = (state_there, values_there, candidate)
+                turn_rows = self.fit.turn_rows
+        self.fit.turn_rows = turn_rows
         return best
-
-    def _starting_sets(self, search: Search, found: Set) -> Iterator[Set]:
-        """Starting sets whose states may be far from the nominal one."""
-        if (far := self._set_with_large_angle(search)) is not None:
-            yield far
-        if elsewhere := self._positions_elsewhere():
-            yield search.evaluate(elsewhere)
-        usual = tuple((c, c.variants[0]) for c in self.dictionary.causes if c.usual)
-        keys = {c.key for c, _ in usual}
-        scatter = priors.SIZES[list(found.sizes.instability)]
-        if (scatter.max() > LARGE_INSTABILITY and not keys <= found.keys) or (
-            self._turns_need_usual_causes(found, keys)
-        ):
-            yield search.evaluate(usual)
-
-    def _turns_need_usual_causes(self, found: Set, usual: set[str]) -> bool:
-        """Whether turns are explained by unusual causes, and not by all usual ones.
-
-        Usual causes look less likely about a state that contains unusual ones.
-        """
-        if usual <= found.keys:
-            return False
-        others = [group.columns for cause, group in found.members if not cause.usual]
-        at = np.concatenate([np.empty(0, int), *others])
-        return any(np.isin(t.columns[t.design.any(axis=0)], at).any()
-                   for t in self.turn_rows)  # fmt: skip
-
-    def _set_with_large_angle(self, search: Search) -> Set | None:
-        """Set of one position with a large angle error, if there seems to be one.
-
-        A large angle is not linear: about the stated angle its residuals make it less
-        likely than causes with more columns. It is large if its square shows.
-        """
-        nothing = search.evaluate(())
-        for offer in search.offers(nothing):
-            cause, group = offer.member
-            if cause.kind != "position":
-                continue
-            one = search.accept(nothing, offer)
-            there = estimates_by_column(one.state, self.dictionary)[group.columns]
-            return one if np.abs(there).max() >= visible_angle(search.gram) else None
-        return None
-
-    def _positions_elsewhere(self) -> tuple[Member, ...]:
-        """Positions whose force is far from the stated one, if they are the fewer.
-
-        Two that were exchanged hide each other: about the stated angles, everything
-        else seems likelier.
-        """
-        causes = [c for c in self.dictionary.causes if c.position >= 0]
-        far = [
-            c
-            for c in causes
-            if self.system.starting_angles(self.nominal, c.position).any()
-        ]
-        if 2 * len(far) >= len(causes):  # then the device is what is different
-            return ()
-        return tuple((c, c.variants[0]) for c in far)
-
-    def refine_beside(self, found: InferenceResult, there: Set) -> Set:
-        """A set with its shapes refined, except those that the result contains.
-
-        The columns that this needs are added to a copy of the dictionary.
-        """
-        own = self.independent_copy(found)
-        members, known = there.members, [g for _, g in found.best.members]
-        for i, (_, group) in enumerate(members):
-            if group.shape and group.effect is not None and group not in known:
-                members = own.refine_shape(
-                    found.state, found.values, members, [i], there.sizes
-                )
-        search = own.search_among(found.state, found.values, [members])
-        return search.evaluate(members, there.sizes)
-
-    def independent_copy(self, found: InferenceResult) -> Inference:
-        """A copy for a result, with its turns, to which columns can be added."""
-        own = Inference(self.system.independent_copy(), self.nominal)
-        own.turn_rows = list(found.turn_rows)
-        return own

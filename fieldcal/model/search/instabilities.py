@@ -33,23 +33,24 @@ def tried_instabilities(
     """
     if other is not None:
         return list(dict.fromkeys([instability, other]))
-    found = [instability]
-    for some in LOWERED_TOGETHER if typical.any() else ():
+    tried = [instability]
+    for lowered in LOWERED_TOGETHER if typical.any() else ():
         for down in INSTABILITY_STEPS_DOWN:
-            found.append(lowered_instability(instability, some, down))
+            tried.append(lowered_instability(instability, lowered, down))
     acc = LOWERED_TOGETHER[0]
     if typical[CLOSURE] and max(instability[c] for c in acc) > UNIT_INDEX:
         steady = lowered_instability(instability, acc, INSTABILITY_STEPS_DOWN[-1])
-        found += [
+        tried += [
             steady[:CLOSURE] + (max(steady[CLOSURE], up),) for up in RAISED_CLOSURES
         ]
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(tried))
 
 
 def lowered_instability(
-    instability: InstabilityIndices, some: Sequence[int], down: int
+    instability: InstabilityIndices, lowered: Sequence[int], down: int
 ) -> InstabilityIndices:
-    """Instabilities with some of them lowered by `down` steps."""
+    """Instabilities with those of the numbers `lowered` lowered by `down` steps."""
     return tuple(
-        max(size - down, 0) if i in some else size for i, size in enumerate(instability)
+        max(size - down, 0) if i in lowered else size
+        for i, size in enumerate(instability)
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,12 @@ class Offer:
     size: int
     instability: InstabilityIndices
 
+    def with_all_parameters(self) -> Offer:
+        """The offer with all parameters that its cause has."""
+        cause, group = self.member
+        whole = cause.full_variant(group)
+        return self if whole is group else replace(self, member=(cause, whole))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OfferTable:
@@ -55,30 +61,32 @@ class OfferTable:
     offers: list[Offer]
 
 
-def extra_log_odds(alike: EqualWidthGroups, apart: dict[int, Array]) -> Array:
+def extra_log_odds(
+    alike: EqualWidthGroups, log_prior_by_variant: dict[int, Array]
+) -> Array:
     """Positive log prior odds of groups, (m,); 0 for those unlikely before the rows.
 
     A cause that begins in one triad where the device was off also begins in the other,
     whether or not the rows show it.
     """
     out = np.zeros(len(alike.cause))
-    for i, shares in apart.items():
-        some = alike.cause == i
-        out[some] = np.maximum(shares[alike.variant[some]], 0.0)
+    for i, shares in log_prior_by_variant.items():
+        own = alike.cause == i
+        out[own] = np.maximum(shares[alike.variant[own]], 0.0)
     return out
 
 
 def ranked_offers(
-    there: Set, score: float, less: InstabilityIndices, best: BestVariants
+    current: Set, score: float, instability: InstabilityIndices, best: BestVariants
 ) -> list[Offer]:
     """Offers of causes that a set does not contain, the best first.
 
     Of causes that differ only in their position, the best one.
     """
     offers = [
-        Offer((cause, cause.variants[v]), score + worth, size, less)
-        for cause, (worth, v, size) in best.items()
-        if cause.key not in there.keys
+        Offer((cause, cause.variants[v]), score + added, size, instability)
+        for cause, (added, v, size) in best.items()
+        if cause.key not in current.keys
     ]
     best_by_name: dict[tuple[str, str], Offer] = {}
     for offer in sorted(offers, key=lambda o: -o.score):

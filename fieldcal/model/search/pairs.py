@@ -82,15 +82,17 @@ def pair_gains(
     }
     number = np.array([np.sum(wide[:i] == w) for i, w in enumerate(wide)])
     for v, w in np.unique(wide[every], axis=0).tolist():
-        some = np.flatnonzero((wide[every] == (v, w)).all(axis=1))
-        i, j = every[some].T
+        pair_numbers = np.flatnonzero((wide[every] == (v, w)).all(axis=1))
+        i, j = every[pair_numbers].T
         one, two = alone[v].at_numbers(number[i]), alone[w].at_numbers(number[j])
         shared = inner[one.at[:, :, None], two.at[:, None, :]]
-        kept = _gain_bound(one, two, shared) >= enough[some]
+        kept = _gain_bound(one, two, shared) >= enough[pair_numbers]
         if kept.any():
             both = (one.at_numbers(kept), two.at_numbers(kept), shared[kept])
             start = np.asarray(sizes)[i[kept]]
-            yield from _gains_of_equal_widths(*both, start, every[some[kept]].tolist())
+            yield from _gains_of_equal_widths(
+                *both, start, every[pair_numbers[kept]].tolist()
+            )
 
 
 def _gain_bound(one: _Alone, two: _Alone, shared: Array) -> Array:
@@ -108,19 +110,19 @@ def _gain_bound(one: _Alone, two: _Alone, shared: Array) -> Array:
 
 
 def _gains_of_equal_widths(
-    one: _Alone, two: _Alone, shared: Array, start: Index, both: Sequence[list[int]]
+    one: _Alone, two: _Alone, shared: Array, start: Index, pairs: Sequence[list[int]]
 ) -> Iterator[PairGain]:
     """Gains of pairs whose first groups, and whose second groups, have equal widths."""
     first, then = _Beside(one, two, shared), _Beside(two, one, shared.swapaxes(1, 2))
-    n = np.arange(len(both))
-    found = []
-    for begin in (start, np.full(len(both), UNIT_INDEX)):
+    n = np.arange(len(pairs))
+    maxima = []
+    for begin in (start, np.full(len(pairs), UNIT_INDEX)):
         v = then.profile(begin).argmax(axis=1)
         profile = first.profile(v)
         u = profile.argmax(axis=1)
-        found.append((two.profile[n, v] + profile[n, u], u, v))
-    for k, (i, j) in enumerate(both):
-        gain, sizes = max((float(g[k]), (int(u[k]), int(v[k]))) for g, u, v in found)
+        maxima.append((two.profile[n, v] + profile[n, u], u, v))
+    for k, (i, j) in enumerate(pairs):
+        gain, sizes = max((float(g[k]), (int(u[k]), int(v[k]))) for g, u, v in maxima)
         yield gain, (i, j), sizes
 
 
@@ -151,15 +153,18 @@ class _Alone:
         own, right = inner[at[:, :, None], at[:, None, :]], rhs[at]
         strength, axes = np.linalg.eigh(own)
         top = np.diagonal(own, 0, 1, 2).max(axis=1, keepdims=True)
-        seen = strength > MIN_EIGENVALUE * np.maximum(top, 1e-300)
-        axes, strength = axes * seen[:, None, :], np.where(seen, strength, 0.0)
+        determined = strength > MIN_EIGENVALUE * np.maximum(top, 1e-300)
+        axes, strength = (
+            axes * determined[:, None, :],
+            np.where(determined, strength, 0.0),
+        )
         along = (right[:, None, :] @ axes)[:, 0]
         profile = gains_from_eigenvalues(strength, along**2) + LOG_DENSITY
         return cls(at, own, right, strength, axes, along, profile)
 
-    def at_numbers(self, some: Index | NDArray[np.bool_]) -> Self:
+    def at_numbers(self, numbers: Index | NDArray[np.bool_]) -> Self:
         """Some of the groups; one may be there more than once."""
-        return type(self)(*(getattr(self, name)[some] for name in self.__slots__))
+        return type(self)(*(getattr(self, name)[numbers] for name in self.__slots__))
 
 
 class _Beside:

@@ -35,44 +35,49 @@ from fieldcal.model.evidence.sets import Set
 def proportional_causes(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:
     """Causes of proportional offsets, about the window offsets beside each set."""
     for part, channels in TRIADS:
-        some = np.intersect1d(channels, dictionary.observed)
-        if len(some) < 2 or len(dictionary.window_positions) <= MIN_WINDOWS:
+        observed = np.intersect1d(channels, dictionary.observed)
+        if len(observed) < 2 or len(dictionary.window_positions) <= MIN_WINDOWS:
             continue
-        about = [_window_offsets(dictionary, one, some) for one in sets]
+        about = [_window_offsets(dictionary, fitted, observed) for fitted in sets]
         groups = tuple(
-            _proportional_group(dictionary, part, some, left) for left in about
+            _proportional_group(dictionary, part, observed, offsets)
+            for offsets in about
         )
         yield Cause("position", part, priors.UNKNOWN_FUNCTION_CHANCE, groups, "unknown")
 
 
-def _window_offsets(d: Dictionary, there: Set, some: Array) -> Array:
+def _window_offsets(d: Dictionary, fitted: Set, channels: Array) -> Array:
     """Offsets of the windows that a set does not explain, in typical sizes, (p, c)."""
-    rows = there.state.rows.gram.with_instability(
+    rows = fitted.state.rows.gram.with_instability(
         priors.SIZES[0] * d.typical_instability
     )
-    state = Eliminated.of(rows, there.state.columns, there.state.prior_sigma)
-    columns = np.concatenate([d.window_columns(c) for c in some])
+    state = Eliminated.of(rows, fitted.state.columns, fitted.state.prior_sigma)
+    columns = np.concatenate([d.window_columns(c) for c in channels])
     inner, rhs = state.schur_complement(
-        columns, np.repeat(typical_unknown_sizes(d)[some], len(d.window_positions))
+        columns, np.repeat(typical_unknown_sizes(d)[channels], len(d.window_positions))
     )
     inner.flat[:: len(columns) + 1] += 1 / priors.SIZES[-1] ** 2
-    left: Array = np.linalg.solve(inner, rhs).reshape(len(some), -1).T
-    return left
+    offsets: Array = np.linalg.solve(inner, rhs).reshape(len(channels), -1).T
+    return offsets
 
 
-def _proportional_group(d: Dictionary, part: str, some: Array, left: Array) -> Group:
+def _proportional_group(
+    d: Dictionary, part: str, channels: Array, offsets: Array
+) -> Group:
     """Group about the leading singular vectors of the offsets."""
-    course, size, directions = np.linalg.svd(left, full_matrices=False)
-    middle = course[:, 0] * np.sqrt(len(left))
-    directions = directions * typical_unknown_sizes(d)[some]  # (1), in outputs
+    course, size, directions = np.linalg.svd(offsets, full_matrices=False)
+    middle = course[:, 0] * np.sqrt(len(offsets))
+    directions = directions * typical_unknown_sizes(d)[channels]  # (1), in outputs
 
     def of(view: RowView) -> Array:
         inside = np.equal.outer(view.x.position, d.window_positions).astype(float)
-        out = np.zeros((len(inside), 6, len(left) + len(directions) - 1))
-        out[:, some, : len(left)] = inside[:, None] * directions[0][:, None]
-        out[:, some, len(left) :] = (inside @ middle)[:, None, None] * directions[1:].T
+        out = np.zeros((len(inside), 6, len(offsets) + len(directions) - 1))
+        out[:, channels, : len(offsets)] = inside[:, None] * directions[0][:, None]
+        out[:, channels, len(offsets) :] = (inside @ middle)[
+            :, None, None
+        ] * directions[1:].T
         return out
 
-    width = len(left) + len(directions) - 1
+    width = len(offsets) + len(directions) - 1
     at = d.add(General("in proportion", of), width) + np.arange(width)
     return Group("position", part, at, np.ones(width))

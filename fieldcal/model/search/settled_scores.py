@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.model.evidence.sets import Set
-from fieldcal.model.search.inference import Inference, InferenceResult
-from fieldcal.model.search.selection import ALTERNATIVE_MARGIN, Search
+from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.search.inference import InferenceResult
+from fieldcal.model.search.variations import ALTERNATIVE_MARGIN
 
 VISIBLE_ERROR = 1.0
 """Error of a linearised mean that shows, in its standard deviations."""
@@ -27,38 +27,33 @@ def correct_scores(found: InferenceResult) -> None:
 
     The corrections are those of the search, whose scores stay those of its rows.
     """
-    search, best = found.search, found.best
-    near = [
-        one
-        for one in search.visited.values()
-        if one.score > best.score - ALTERNATIVE_MARGIN
-    ]
+    sets, best = found.search.sets, found.best
+    near = [s for s in sets.visited.values()
+            if s.score > best.score - ALTERNATIVE_MARGIN]  # fmt: skip
     settled, known = 0, {best.keys_in_state}
-    for one in sorted(near, key=lambda s: -s.score):
-        if one.keys_in_state in known or settled == MAX_SETTLED_SETS:
+    for visited in sorted(near, key=lambda s: -s.score):
+        keys = visited.keys_in_state
+        if keys in known or settled == MAX_SETTLED_SETS:
             continue
-        known.add(one.keys_in_state)
-        if linearisation_error(found, one) > VISIBLE_ERROR:
+        known.add(keys)
+        if linearisation_error(found, visited) > VISIBLE_ERROR:
             settled += 1
-            search.corrections[one.keys_in_state] = (
-                _settled_score(found, one) - one.score
-            )
+            sets.corrections[keys] = _settled_score(found, visited) - visited.score
 
 
-def linearisation_error(found: InferenceResult, there: Set) -> float:
+def linearisation_error(found: InferenceResult, visited: Set) -> float:
     """Largest error of the rows at a set's estimate, in deviations of a mean."""
-    inference: Inference = found.inference
-    state, values = inference.state_at_estimate(there)
-    step = values - inference.pad(found.values)
-    return inference.system.linearisation_error(found.state, state, step)
+    state, values = found.fit.state_at_estimate(visited)
+    step = values - found.fit.pad(found.values)
+    return found.fit.system.linearisation_error(found.state, state, step)
 
 
-def _settled_score(found: InferenceResult, there: Set) -> float:
+def _settled_score(found: InferenceResult, visited: Set) -> float:
     """Score of a set with rows and turns linearised about its own state."""
-    own = found.inference.independent_copy(found)
-    nothing = np.zeros(own.dictionary.width)
-    state, values, settled = own.settle(
-        own.nominal, nothing, there.members, there.sizes
+    fit = found.independent_fit()
+    zeros = np.zeros(fit.dictionary.width)
+    state, values, settled = fit.settle(
+        fit.nominal, zeros, visited.members, visited.sizes
     )
-    search = Search(own.dictionary, own.gram(state, values, found.best))
-    return search.evaluate(there.members, settled.sizes).score
+    sets = Sets(fit.dictionary, fit.gram(state, values, found.best))
+    return sets.evaluate(visited.members, settled.sizes).score

@@ -45,10 +45,10 @@ class TurnEnds:
         return cls(x.f, x.w, x.to_device)
 
     @classmethod
-    def stacked(cls, some: list[TurnEnds]) -> TurnEnds:
+    def stacked(cls, ends: list[TurnEnds]) -> TurnEnds:
         """Stack several inputs of the same positions, (k, n, ...)."""
         return cls(
-            *(np.stack([getattr(e, n) for e in some]) for n in ("f", "w", "held"))
+            *(np.stack([getattr(e, n) for e in ends]) for n in ("f", "w", "held"))
         )
 
     def at(self, *place: object) -> TurnEnds:
@@ -60,9 +60,9 @@ class TurnEnds:
         parts = []
         for name in ("f", "w", "held"):
             own, new = getattr(self, name), getattr(other, name)
-            both = np.repeat(own[None], len(new), axis=0)
-            both[:, here] = new
-            parts.append(both)
+            repeated = np.repeat(own[None], len(new), axis=0)
+            repeated[:, here] = new
+            parts.append(repeated)
         return TurnEnds(*parts)
 
 
@@ -142,7 +142,7 @@ class EndColumns:
 
 def _concatenate(parts: Iterator[TurnEnds]) -> TurnEnds:
     """Concatenate along the columns."""
-    some = list(parts)
+    arrays = list(parts)
     return TurnEnds(
-        *(np.concatenate([getattr(e, n) for e in some]) for n in ("f", "w", "held"))
+        *(np.concatenate([getattr(e, n) for e in arrays]) for n in ("f", "w", "held"))
     )

@@ -76,10 +76,10 @@ def append_course(
 ) -> None:
     """Append the columns `at` of a `Course`, as far as they are `kept`, to `parts`."""
     width = table.shape[1]
-    for c, some in parts.items():
+    for c, channel_parts in parts.items():
         own = slice(c * width, (c + 1) * width)
         if kept[own].any():
-            some.append((at[own][kept[own]], table[:, kept[own]]))
+            channel_parts.append((at[own][kept[own]], table[:, kept[own]]))
 
 
 def gram(
@@ -131,8 +131,11 @@ def gram(
 def _add_windows(out: Gram, part: LinearRows, values: Array) -> tuple[float, int]:
     """Add one channel's rows; returns its squares about the means and their number."""
     c, all_ = part.channel, out.index[part.columns]
-    there = all_ >= 0
-    at, design = all_[there], part.design if there.all() else part.design[:, there]
+    selected = all_ >= 0
+    at, design = (
+        all_[selected],
+        part.design if selected.all() else part.design[:, selected],
+    )
     in_state = np.flatnonzero(values[part.columns])
     white = part.white + part.design[:, in_state] @ values[part.columns[in_state]]
     windows, weight = part.windows, part.info
@@ -156,15 +159,15 @@ def _add_known(out: Gram, known: KnownRows) -> tuple[float, int]:
 
 def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, int]:
     """Add a turn's closure and way; returns the way's squares and their number."""
-    all_, some = out.index[turn.columns], len(turn.closure)
-    there = all_ >= 0
-    at = all_[there]
-    out.residual[i, :some], out.info[i, :some] = turn.closure, turn.info
-    out.means[i, :some, at] = turn.design[:, there].T
-    out.closure_errors[i, :some] = turn.closure_errors
+    all_, count = out.index[turn.columns], len(turn.closure)
+    selected = all_ >= 0
+    at = all_[selected]
+    out.residual[i, :count], out.info[i, :count] = turn.closure, turn.info
+    out.means[i, :count, at] = turn.design[:, selected].T
+    out.closure_errors[i, :count] = turn.closure_errors
     if not len(turn.way):
         return 0.0, 0
-    design = turn.way_design[:, there]
+    design = turn.way_design[:, selected]
     out.within[np.ix_(at, at)] += design.T @ design
     out.rhs[at] += design.T @ turn.way
     return float(turn.way @ turn.way), len(turn.way)

@@ -66,11 +66,15 @@ class MotionSystem(System):
                 append_course(parts, at, rows.cosines(basis.evaluate(views[0])), kept)
                 continue
             table = self._table(basis, views)
-            for c, some in parts.items():
-                there = kept & np.any(table[:, c] != 0.0, axis=0)
-                if there.any():
-                    some.append((at[there], rows.cosines(table[:, c, there])))
-        out = [self._channel(c, some, white[:, c]) for c, some in parts.items() if some]
+            for c, channel_parts in parts.items():
+                shown = kept & np.any(table[:, c] != 0.0, axis=0)
+                if shown.any():
+                    channel_parts.append((at[shown], rows.cosines(table[:, c, shown])))
+        out = [
+            self._channel(c, channel_parts, white[:, c])
+            for c, channel_parts in parts.items()
+            if channel_parts
+        ]
         if wanted is None:
             for part in out:
                 size = np.linalg.norm(part.design, axis=0) * d.typical[part.columns]
@@ -123,12 +127,12 @@ class MotionSystem(System):
         return out
 
     def _channel(
-        self, c: int, some: Sequence[tuple[Index, Array]], white: Array
+        self, c: int, parts: Sequence[tuple[Index, Array]], white: Array
     ) -> LinearRows:
         """One channel's coefficients, whitened."""
         weight = 1 / np.sqrt(self.power[:, c])
-        design = np.hstack([table for _, table in some]) * weight[:, None]
-        columns = np.concatenate([at for at, _ in some])
+        design = np.hstack([table for _, table in parts]) * weight[:, None]
+        columns = np.concatenate([at for at, _ in parts])
         rows = np.arange(len(white))
         return LinearRows(
             int(c), rows, self.motion.part, weight, columns, design, white * weight
@@ -178,7 +182,9 @@ def noise_levels(
     for _, channels in TRIADS:
         triad = [part for part in linear if part.channel in channels]
         if triad:
-            told = [fit_residuals(part, values, found) for part in triad]
-            levels = bands.levels(frequency, *map(list, zip(*told, strict=True)))
-            out |= {part.channel: one for part, one in zip(triad, levels, strict=True)}
+            residuals = [fit_residuals(part, values, found) for part in triad]
+            levels = bands.levels(frequency, *map(list, zip(*residuals, strict=True)))
+            out |= {
+                part.channel: level for part, level in zip(triad, levels, strict=True)
+            }
     return out

@@ -38,11 +38,11 @@ def starting_angles(rows: Rows, nominal: State, position: int) -> Array:
     stated = np.array([x.alpha[own[0]], x.beta[own[0]]])
     if axes.sum() < 2 or not np.isfinite(stated).all():
         return np.zeros(2)
-    seen = force.mean(axis=0)
+    measured = force.mean(axis=0)
 
     def errors(angles: Array) -> Array:
         """Differences of forces at some angles (k, 2) from the mean, of gravity."""
-        off = _forces(x, int(own[0]), angles) - seen
+        off = _forces(x, int(own[0]), angles) - measured
         apart: Array = np.linalg.norm(off[:, axes], axis=1) / x.gravity
         return apart
 

@@ -96,52 +96,54 @@ def columns_of_turns(
     """
     if not turns:
         return []
-    found = [_TurnColumnsBuilder(t, v) for t, v in zip(turns, views, strict=True)]
+    builders = [_TurnColumnsBuilder(t, v) for t, v in zip(turns, views, strict=True)]
     every = _concatenate(views)
     cut = np.cumsum([len(view.x) for view in views])[:-1]
-    for first, one in dictionary.bases:
-        if isinstance(one, Course):
+    for first, basis in dictionary.bases:
+        if isinstance(basis, Course):
             if dictionary.unoriented.any():  # rotates the force at the ends
-                for some in found:
-                    some.no_closing(first + np.arange(3 * one.width))
-            if one.timed:
-                for some, course in zip(
-                    found, np.split(one.evaluate(every), cut), strict=True
+                for builder in builders:
+                    builder.no_closing(first + np.arange(3 * basis.width))
+            if basis.timed:
+                for builder, course in zip(
+                    builders, np.split(basis.evaluate(every), cut), strict=True
                 ):
-                    some.course(first, course)
-            elif one.while_output_stands:
-                for some in found:
-                    if some.turn.standing_share is not None:
-                        even = np.ones((len(some.view.x), 1))
-                        some.course(first, even, some.turn.standing_share)
+                    builder.course(first, course)
+            elif basis.while_output_stands:
+                for builder in builders:
+                    if builder.turn.standing_share is not None:
+                        even = np.ones((len(builder.view.x), 1))
+                        builder.course(first, even, builder.turn.standing_share)
             continue
-        for some, (columns, table, bent) in zip(
-            found, _general_columns(first, one, found, every, cut, at_ends), strict=True
+        for builder, (columns, table, bent) in zip(
+            builders,
+            _general_columns(first, basis, builders, every, cut, at_ends),
+            strict=True,
         ):
-            some.general_form(columns, table, bent)
+            builder.general_form(columns, table, bent)
             if known is not None:
                 kept = seen_on_the_way(columns, dictionary, known)
-                some.general.append((columns[kept], table[:, :, kept]))
-    return [some.met() for some in found]
+                builder.general.append((columns[kept], table[:, :, kept]))
+    return [builder.met() for builder in builders]
 
 
 def _general_columns(
     first: int,
-    one: General,
-    found: Sequence[_TurnColumnsBuilder],
+    basis: General,
+    builders: Sequence[_TurnColumnsBuilder],
     every: RowView,
     cut: Index,
     at_ends: Mapping[int, EndColumns],
 ) -> Iterator[tuple[Index, Array, Array]]:
     """Columns (k,) of each turn, outputs (m + 1, 6, k), and change of ends (3, k)."""
     if first in at_ends:
-        for some in found:
-            yield at_ends[first].columns_for(some.turn, some.view.state.scale)
+        for builder in builders:
+            yield at_ends[first].columns_for(builder.turn, builder.view.state.scale)
         return
-    if one.needs_whole_turn:
-        parts = [one.evaluate(some.view) for some in found]
+    if basis.needs_whole_turn:
+        parts = [basis.evaluate(builder.view) for builder in builders]
     else:
-        parts = np.split(one.evaluate(every), cut)
+        parts = np.split(basis.evaluate(every), cut)
     for table in parts:
         width = table.shape[2]
         yield first + np.arange(width), table, np.zeros((3, width))

@@ -155,7 +155,7 @@ class Turns:
     ) -> TurnRows:
         """Closure and way of one turn, with all columns that influence them."""
         d, state = self.dictionary, view.state
-        _, seen, across = turn_geometry(
+        _, residual, across = turn_geometry(
             turn.ends, turn.positions, turn.attitude, turn.done
         )
         index, close, general = met.index, met.closing, met.general
@@ -167,16 +167,16 @@ class Turns:
         )
         for p, bent in loose.items():
             # the force there is the measured one, which may differ from the state's
-            seen = seen - bent @ self.off[p]
+            residual = residual - bent @ self.off[p]
             close = close - bent @ self.means[p][:, index]
             ends = ends + bent @ self._force_covariance(p) @ bent.T
-        there = np.abs(close).max(axis=0) > 0
+        touching = np.abs(close).max(axis=0) > 0
         for columns, outputs in general:
-            there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
-        index = index[there]
+            touching[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
+        index = index[touching]
         basis, info = _known_axes(across, ends, self._closure_variance(turn, view))
-        close = basis @ close[:, there]
-        closure = basis @ seen + close @ values[index]
+        close = basis @ close[:, touching]
+        closure = basis @ residual + close @ values[index]
         off = [(basis @ bent) ** 2 for bent in loose.values()]
         bent = np.sqrt(sum(off, np.zeros((len(basis), 3))))
         drift = np.abs(basis @ turn.weights(state.scale[3:]).sum(axis=1))
@@ -232,15 +232,15 @@ class Turns:
         """
         ends = turn.ends
         rows = first_row_of_each(ends, turn.positions)
-        both, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
+        forces, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
         for i, p in enumerate(turn.positions):
             j = int(np.searchsorted(self.dictionary.window_positions, p))
-            up = both[i] / np.linalg.norm(both[i])
+            up = forces[i] / np.linalg.norm(forces[i])
             across = (np.eye(3) - np.outer(up, up)) @ np.linalg.inv(self.slopes[j])
-            step = 1e-4 * float(np.linalg.norm(both[i]))
+            step = 1e-4 * float(np.linalg.norm(forces[i]))
             sides = []
             for sign in (1.0, -1.0):
-                f = np.repeat(both[None], 3, axis=0)
+                f = np.repeat(forces[None], 3, axis=0)
                 f[:, i] += sign * step * np.eye(3)
                 sides.append(closures(f, held, turn.attitude[-1])[0])
             bent = (sides[0] - sides[1]).T / (2 * step)
@@ -307,11 +307,11 @@ def _output_slopes(state: State, x: Experience, since: Array) -> Array:
 
     It contains cross-coupling and nonlinearity.
     """
-    seen, out = state.experienced(x), np.zeros((len(x), 3, 3))
+    inputs, out = state.experienced(x), np.zeros((len(x), 3, 3))
     for c in range(3):
         step = FORCE_STEP * np.eye(3)[c]
         up, down = (
-            state.output(replace(seen, f=seen.f + s * step), since)[:, :3]
+            state.output(replace(inputs, f=inputs.f + s * step), since)[:, :3]
             for s in (1.0, -1.0)
         )
         out[:, :, c] = (up - down) / (2 * FORCE_STEP)
@@ -326,12 +326,12 @@ def _drop_shaken_way(rows: list[TurnRows]) -> list[TurnRows]:
     size = sum(len(r.way) for r in rows)
     design, white, at = np.zeros((size, len(columns))), np.zeros(size), 0
     for r in rows:
-        there = slice(at, at := at + len(r.way))
-        design[there, np.searchsorted(columns, r.columns)] = r.way_design
-        white[there] = r.way
-    some = design[:, np.abs(design).max(axis=0) > 0]
-    rest = white - some @ np.linalg.lstsq(some, white, rcond=1e-9)[0]
-    if float(rest @ rest) <= MAX_WAY_CHI2 * max(size - some.shape[1], 1):
+        rows_of_turn = slice(at, at := at + len(r.way))
+        design[rows_of_turn, np.searchsorted(columns, r.columns)] = r.way_design
+        white[rows_of_turn] = r.way
+    used = design[:, np.abs(design).max(axis=0) > 0]
+    rest = white - used @ np.linalg.lstsq(used, white, rcond=1e-9)[0]
+    if float(rest @ rest) <= MAX_WAY_CHI2 * max(size - used.shape[1], 1):
         return rows
     return [
         replace(r, way=np.zeros(0), way_design=np.zeros((0, len(r.columns))))

@@ -57,7 +57,7 @@ class WayRows:
         `general` are columns with their outputs at the edges, `values` (all,) those in
         the state, `index` (k,) the columns wanted.
         """
-        d, found, turn = self.dictionary, self.known.state, self.turn
+        d, posterior, turn = self.dictionary, self.known.state, self.turn
         columns = np.concatenate([c for c, _ in general])
         design = self._output_means(np.concatenate([o for _, o in general], axis=2))
         flat = design.reshape(-1, len(columns))
@@ -66,10 +66,12 @@ class WayRows:
         off = turn.acc - turn.means(output[:, :3])
         z = off.ravel() + flat[:, own] @ values[columns[own]]
         held, at = self._window_columns(columns, flat)
-        estimate = np.where(values[found.columns[at]] != 0, 0.0, found.estimate[at])
+        estimate = np.where(
+            values[posterior.columns[at]] != 0, 0.0, posterior.estimate[at]
+        )
         z = z - held @ estimate
         cov = self._covariance()
-        cov += held @ found.inverse[np.ix_(at, at)] @ held.T
+        cov += held @ posterior.inverse[np.ix_(at, at)] @ held.T
         sd = self.turn.sd.ravel()
         whiten = triangular_inverse(cholesky_root(cov / np.outer(sd, sd))) / sd
         whole = np.zeros((len(z), len(index)))
@@ -87,10 +89,10 @@ class WayRows:
 
     def _window_columns(self, columns: Index, flat: Array) -> tuple[Array, Index]:
         """Values of the columns of the windows' set, and their indices in it."""
-        d, found = self.dictionary, self.known.state
+        d, posterior = self.dictionary, self.known.state
         out, at = [], []
         order = np.argsort(columns)
-        for i, column in enumerate(found.columns.tolist()):
+        for i, column in enumerate(posterior.columns.tolist()):
             j = int(np.searchsorted(columns[order], column))
             if j < len(columns) and columns[order[j]] == column and d.shown[column]:
                 out.append(flat[:, order[j]])

@@ -54,7 +54,10 @@ class WindowSystem(System):
         off = self.rows.y - state.output(view.x, d.since)
         asked = np.ones(d.width, bool) if wanted is None else wanted
         parts = self._parts(view, asked)
-        out = [self._channel(c, some, off[:, c]) for c, some in parts.items()]
+        out = [
+            self._channel(c, channel_parts, off[:, c])
+            for c, channel_parts in parts.items()
+        ]
         if wanted is None:
             for part in out:
                 d.shown[part.columns] |= self._shows(part)
@@ -66,13 +69,13 @@ class WindowSystem(System):
         Windows of unknown orientation do not count.
         """
         d, x = self.dictionary, self.rows.x
-        here, there = (
+        outputs, outputs_at_other = (
             s.output(RowView.of(x, d.since, s).x, d.since) for s in (state, other)
         )
         wanted, largest = step != 0, 0.0
         wanted[d.bias : d.bias + 6] = True  # so that every channel has its rows
         for part in self.linearised(state, wanted):
-            moved = (there - here)[part.rows, part.channel] * part.weight
+            moved = (outputs_at_other - outputs)[part.rows, part.channel] * part.weight
             off = part.window_means(moved - part.design @ step[part.columns])
             counted = ~d.unoriented[part.windows]
             sigmas = np.abs(off) * np.sqrt(part.info)
@@ -97,10 +100,10 @@ class WindowSystem(System):
             if not kept.all():
                 at, table = at[kept], table[:, :, kept]
             touched = table != 0.0
-            for c, some in parts.items():
-                there = (touched[:, c] & self.rows.used[:, c, None]).any(axis=0)
-                if there.any():
-                    some.append((at[there], table[:, c, there]))
+            for c, channel_parts in parts.items():
+                shown = (touched[:, c] & self.rows.used[:, c, None]).any(axis=0)
+                if shown.any():
+                    channel_parts.append((at[shown], table[:, c, shown]))
         return parts
 
     def _channel(
@@ -123,10 +126,10 @@ class WindowSystem(System):
         """
         table = np.abs(part.design) * self.dictionary.typical[part.columns]
         if part.channel < 3:
-            there: NDArray[np.bool_] = (table / part.weight[:, None]).max(
+            visible: NDArray[np.bool_] = (table / part.weight[:, None]).max(
                 axis=0
             ) > MIN_VISIBLE_ACC
-            return there
+            return visible
         stands_out: NDArray[np.bool_] = (
             np.linalg.norm(table, axis=0) > MIN_VISIBLE_SIGMAS
         )

@@ -57,9 +57,11 @@ def sampling_error(t: Array, w: Array, each: int, noise: Array) -> float:
     whole = (len(t) - 1) // (2 * each) * 2 * each
     ends = []
     for skip in (1, 2):
-        some = slice(0, whole + 1, skip)
+        coarse = slice(0, whole + 1, skip)
         edge = np.arange(0, whole // skip + 1, max(each // skip, 1))
-        ends.append(attitudes_from_rotations(small_turns(t[some], w[some], edge))[-1])
+        ends.append(
+            attitudes_from_rotations(small_turns(t[coarse], w[coarse], edge))[-1]
+        )
     off = ends[0] @ ends[1].T
     apart = off[2, 1] ** 2 + off[0, 2] ** 2 + off[1, 0] ** 2
     chance = float(noise @ noise) * float(t[-1] - t[0]) ** 2 / len(t)
@@ -141,8 +143,8 @@ def closures(f: Array, held: Array, end: Array) -> tuple[Array, NDArray[np.bool_
     if whole.all():
         return antisymmetric_vector(off), whole
     up = f[:, 0] / np.linalg.norm(f[:, 0], axis=1, keepdims=True)
-    seen = f[:, 1] @ end
-    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+    force = f[:, 1] @ end
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
     return np.where(
-        whole[:, None], antisymmetric_vector(off), np.cross(up, seen)
+        whole[:, None], antisymmetric_vector(off), np.cross(up, force)
     ), whole

@@ -82,8 +82,8 @@ class Steps:
     @property
     def at(self) -> Array:
         """Instants of the edges, s."""
-        found: Array = self.t[self.edge]
-        return found
+        times: Array = self.t[self.edge]
+        return times
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,10 +44,10 @@ def motion_bounds(
     if not has_no_pause(block.t, first, last, rate):
         return None
     whole = (first, last) if block.t[last - 1] - block.t[first] < MAX_TURN_S else None
-    seen = [rows.y[rows.x.position == p, 3:] for p in pair]
-    if not all(np.isfinite(one).any(axis=0).all() for one in seen):
+    rates = [rows.y[rows.x.position == p, 3:] for p in pair]
+    if not all(np.isfinite(window_rates).any(axis=0).all() for window_rates in rates):
         return whole  # nothing tells how they rest
-    rest = [np.nanmean(one, axis=0) for one in seen]
+    rest = [np.nanmean(window_rates, axis=0) for window_rates in rates]
     total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])
     level = np.abs(total[m:] - total[:-m]) / m
     limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)

@@ -54,11 +54,11 @@ class StandingOutputs:
 
         `gyr` (n, 3) are the outputs, `edge` the samples at the edges.
         """
-        there = self._there(gyr).astype(float)
+        at_value = self._there(gyr).astype(float)
         each = max(1, int(edge[1] - edge[0]))
         kernel = np.ones(each) / each
-        smooth = np.column_stack([np.convolve(c, kernel, "same") for c in there.T])
-        inside = np.convolve(np.ones(len(there)), kernel, "same")
+        smooth = np.column_stack([np.convolve(c, kernel, "same") for c in at_value.T])
+        inside = np.convolve(np.ones(len(at_value)), kernel, "same")
         out: Array = smooth[edge] / inside[edge][:, None]
         return out
 
@@ -74,7 +74,7 @@ class StandingOutputs:
         edge, attitude : samples at the m + 1 edges, and the attitude there
 
         """
-        there, out = self._there(gyr), np.zeros((3, 3))
+        at_value, out = self._there(gyr), np.zeros((3, 3))
         gap = float(t[-1] - t[0]) / max(1, len(t) - 1)
         for c in np.flatnonzero(self.step > 0):
             bound = np.flatnonzero(np.diff(gyr[:, c]) != 0) + 1
@@ -84,7 +84,7 @@ class StandingOutputs:
             middle = (first + last) // 2
             near = np.clip(np.searchsorted(edge, middle), 0, len(edge) - 1)
             axis = attitude[near, c]  # R^T e_c
-            part = self.variance[c] * np.where(there[first, c], 0.0, part)
+            part = self.variance[c] * np.where(at_value[first, c], 0.0, part)
             out += np.einsum("r,ri,rj->ij", part, axis, axis)
         return out
 

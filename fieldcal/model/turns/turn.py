@@ -301,16 +301,16 @@ def _without_lost_samples(source: RowSource) -> RowSource:
 
 def select_rows(x: Experience, rows: Sequence[int]) -> Experience:
     """Some rows of an experience."""
-    some: dict[str, Any] = {n: getattr(x, n)[list(rows)] for n in PER_ROW}
-    return replace(x, **some)
+    selected: dict[str, Any] = {n: getattr(x, n)[list(rows)] for n in PER_ROW}
+    return replace(x, **selected)
 
 
-def concatenate_rows(some: Sequence[Experience]) -> Experience:
+def concatenate_rows(parts: Sequence[Experience]) -> Experience:
     """Concatenate rows of one session."""
     every: dict[str, Any] = {
-        n: np.concatenate([getattr(x, n) for x in some]) for n in PER_ROW
+        n: np.concatenate([getattr(x, n) for x in parts]) for n in PER_ROW
     }
-    return replace(some[0], **every)
+    return replace(parts[0], **every)
 
 
 def apply_way_effects(x: Experience, state: State) -> Experience:

@@ -28,6 +28,7 @@ from fieldcal.model.search.instabilities import (
     LOWERED_TOGETHER,
     lowered_instability,
 )
+from fieldcal.model.search.set_at_instability import with_typical_calibration
 
 SET = np.array([0, 3, 4, 7])
 KEYS = ("angle_offset", "bias_drift:gyr", "alpha:ay")
@@ -140,7 +141,7 @@ def found(seed: int) -> tuple[Session, Set]:
     rng = np.random.default_rng(seed)
     tau = SESSION.dictionary.typical_instability * 3.0
     search = SESSION.search(SESSION.noise(rng, tau))
-    return SESSION, search.evaluate(())
+    return SESSION, search.sets.evaluate(())
 
 
 def profile_of(there: Set, gram_score: Array, kind: int) -> Array:
@@ -190,7 +191,7 @@ def test_the_weight_of_a_set_is_its_score_and_what_each_size_leaves_of_it(
         profile = profile_of(there, np.array(score), c)
         total += np.logaddexp.reduce(profile - profile.max())
     assert there.score == pytest.approx(total, rel=1e-6)
-    assert search.evaluate(()).members == ()
+    assert search.sets.evaluate(()).members == ()
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -199,8 +200,8 @@ def test_what_a_set_may_be_given_is_asked_beside_other_instabilities(seed: int) 
     rng = np.random.default_rng(seed)
     tau = SESSION.dictionary.typical_instability * 3.0
     search = SESSION.search(SESSION.noise(rng, tau))
-    there, d = search.evaluate(()), SESSION.dictionary
-    tables = search.tables(there)
+    there, d = search.sets.evaluate(()), SESSION.dictionary
+    tables = search.offers.tables(there)
     mode = there.sizes.instability
     kept = {t.instability for t in tables}
     expected = {
@@ -217,13 +218,13 @@ def test_what_a_set_may_be_given_is_asked_beside_other_instabilities(seed: int) 
         - there.state.score
         - instability_log_prior(mode, d.typical_instability)
     )
-    wide, cost = search.with_typical_calibration(there)
+    wide, cost = with_typical_calibration(search.sets.dictionary, there)
     for table in tables:
         if table.instability == mode:
             continue
         scores = []
         for sizes, more in ((there.state.prior_sigma, 0.0), (wide, cost)):
-            rows = search.gram.with_instability(
+            rows = search.sets.gram.with_instability(
                 SIZES[list(table.instability)] * d.typical_instability
             )
             one = Eliminated.of(rows, there.state.columns, sizes)
@@ -250,14 +251,14 @@ def test_what_a_set_may_be_given_is_asked_beside_other_instabilities(seed: int) 
     assert small.score == pytest.approx(expected)
     beside = lowered_instability(mode, (0, 1, 2), 6)
     fresh = SESSION.search(SESSION.noise(np.random.default_rng(seed), tau))
-    again = fresh.evaluate(())
+    again = fresh.sets.evaluate(())
     told = replace(again.sizes, instability=beside)
-    assert {t.instability for t in fresh.tables(again, told)} == {mode, beside}
+    assert {t.instability for t in fresh.offers.tables(again, told)} == {mode, beside}
 
 
 def test_sizes_below_what_is_typical_are_opened_at_a_price() -> None:
     search = SESSION.search(SESSION.noise(np.random.default_rng(1)))
-    there, d = search.evaluate(()), SESSION.dictionary
+    there, d = search.sets.evaluate(()), SESSION.dictionary
     small = tuple(
         UNIT_INDEX - 3 if i == 0 else UNIT_INDEX + 2 for i in range(len(d.always))
     )
@@ -267,8 +268,8 @@ def test_sizes_below_what_is_typical_are_opened_at_a_price() -> None:
         for g, s in zip(d.always, small, strict=True)
     ]
     state = replace(there.state, prior_sigma=np.concatenate(parts))
-    wide, cost = search.with_typical_calibration(
-        replace(there, sizes=sizes, state=state)
+    wide, cost = with_typical_calibration(
+        search.sets.dictionary, replace(there, sizes=sizes, state=state)
     )
     first = len(d.always[0].columns)
     np.testing.assert_allclose(
@@ -296,15 +297,15 @@ def test_the_chance_of_a_set_is_its_causes_each_by_its_variants() -> None:
     offset, drift = causes["angle_offset"], causes["bias_drift:gyr"]
     members = ((offset, offset.variants[0]), (drift, drift.variants[-1]))
     expected = sum(np.log(c.chance / len(c.variants)) for c in (offset, drift))
-    assert search.set_log_prior(members) == pytest.approx(expected)
-    key = search.key(members)
+    assert search.sets.set_log_prior(members) == pytest.approx(expected)
+    key = search.sets.key(members)
     assert key == (("angle_offset", 0), ("bias_drift:gyr", len(drift.variants) - 1))
-    both = search.evaluate(members)
-    assert search.evaluate(members[::-1]) is both, "a set has no order"
+    both = search.sets.evaluate(members)
+    assert search.sets.evaluate(members[::-1]) is both, "a set has no order"
     assert both.keys == {"angle_offset", "bias_drift:gyr"}
-    less = search.without(both, 0)
+    less = search.sets.without(both, 0)
     assert less.keys == {"bias_drift:gyr"}
-    start = search.sizes_of(both, less.members)
+    start = both.sizes_of(less.members)
     assert start.members == both.sizes.members[1:]
     assert start.calibration == both.sizes.calibration
     assert start.instability == both.sizes.instability

@@ -15,8 +15,8 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.posterior.held_out import HeldOut, folds, held_out_residuals
-from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
@@ -88,8 +88,8 @@ def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Ref
         0, 1e-3, 2 * d.position_count
     )
     linear = WindowSystem(rows, d).linearised(state)
-    search = Search(d, gram(linear, d, values))
-    fitted = FittedSet(rows, d, linear, values, search.evaluate(tuple(members)))
+    sets = Sets(d, gram(linear, d, values))
+    fitted = FittedSet(rows, d, linear, values, sets.evaluate(tuple(members)))
     table = np.zeros((ROWS, 6, d.width))
     for part in linear:
         seen = part.design / part.weight[:, None]
@@ -196,13 +196,13 @@ def test_sets_are_chosen_again() -> None:
     y = away.output(away.experienced(x), d.since)
     rows = rows_of(x, y + rng.normal(0, 3e-4, y.shape))
     linear = WindowSystem(rows, d).linearised(state)
-    search = Search(d, gram(linear, d, np.zeros(d.width)))
+    sets = Sets(d, gram(linear, d, np.zeros(d.width)))
     misset = next(c for c in d.causes if c.key == "misset 4")
-    sets = [search.evaluate(m) for m in ((), ((misset, misset.variants[0]),))]
-    assert sets[1].score > sets[0].score + 100
-    best = FittedSet(rows, d, linear, np.zeros(d.width), sets[1])
-    found = held_out_residuals(best, sets)
-    none, there = (held_out_residuals(best, [one]) for one in sets)
+    tried = [sets.evaluate(m) for m in ((), ((misset, misset.variants[0]),))]
+    assert tried[1].score > tried[0].score + 100
+    best = FittedSet(rows, d, linear, np.zeros(d.width), tried[1])
+    found = held_out_residuals(best, tried)
+    none, there = (held_out_residuals(best, [one]) for one in tried)
     left = x.position == 4
     np.testing.assert_allclose(found[left], none[left], rtol=1e-9)
     np.testing.assert_allclose(found[~left], there[~left], rtol=1e-9)

@@ -8,13 +8,13 @@ from small_sessions import SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import (
     INSTABILITY_LOG_DENSITY,
     instability_log_prior,
 )
 from fieldcal.model.posterior.mixture import GIVEN_SET_LOG_DENSITY, Mixing
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.selection import Search
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
 
@@ -29,10 +29,8 @@ def mixing(off: Array, given: bool = True) -> Mixing:
     linear = WindowSystem(rows_of(X, np.hstack([X.f, X.w]) + off), D).linearised(
         nominal()
     )
-    search = Search(D, gram(linear, D, np.zeros(D.width)))
-    return Mixing(
-        D, search.gram, search.evaluate(()), search.typical_instability, given
-    )
+    sets = Sets(D, gram(linear, D, np.zeros(D.width)))
+    return Mixing(D, sets.gram, sets.evaluate(()), sets.typical_instability, given)
 
 
 def wandering(seed: int) -> Array:

@@ -34,10 +34,10 @@ def drifting(size: float = 0.3, gyr: float = 0.3) -> tuple[Search, Set]:
 def test_an_evidence_is_a_score_without_the_chances() -> None:
     search, best = drifting()
     posterior = Posterior(search, best)
-    empty = search.evaluate(())
+    empty = search.sets.evaluate(())
     assert posterior.evidence(empty) == pytest.approx(empty.score)
     settling = CAUSES["settling:acc"]
-    one = search.evaluate(((settling, settling.variants[0]),))
+    one = search.sets.evaluate(((settling, settling.variants[0]),))
     assert posterior.evidence(one) == pytest.approx(one.score - np.log(settling.chance))
 
 
@@ -74,7 +74,7 @@ def test_what_its_chance_brings_near_counts_though_its_evidence_is_behind(
     free = next(c for c in session.dictionary.causes if c.name == "time")
     for patience, counts in ((1.0, True), (-3.0, False)):
         search = session.search(off)
-        best = max((search.evaluate(((free, v),)) for v in free.variants),
+        best = max((search.sets.evaluate(((free, v),)) for v in free.variants),
                    key=lambda s: s.score)  # fmt: skip
         monkeypatch.setattr(probabilities, "ALTERNATIVE_MARGIN", patience)
         walks = {s.keys: w for s, w in Posterior(search, best).weights}
@@ -90,7 +90,7 @@ def test_a_function_that_no_effect_makes_is_no_other_name_for_an_effect() -> Non
     off[:, :3] += 3e-3 * bent[:, None] * [1.0, -0.5, 0.7]
     search = session.search(off)
     (walk,) = (c for c in session.dictionary.causes if c.name == "random_walk")
-    posterior = Posterior(search, search.evaluate(((walk, walk.variants[0]),)))
+    posterior = Posterior(search, search.sets.evaluate(((walk, walk.variants[0]),)))
     (found,) = posterior.probable_causes()
     assert (found.aliases, found.alike) == (("time",), ())
     own, both = (
@@ -104,7 +104,7 @@ def test_the_weights_are_of_the_sets_and_of_what_was_refined() -> None:
     search, best = drifting()
     posterior = Posterior(search, best)
     sets = [s for s, _ in posterior.weights]
-    assert len(sets) == len(search.visited)
+    assert len(sets) == len(search.sets.visited)
     score = np.array([s.score for s in sets])
     share = np.exp(score - score.max())
     weights = np.array([w for _, w in posterior.weights])
@@ -126,7 +126,7 @@ def test_what_fades_is_looked_at_between_the_points_of_its_grid() -> None:
 
     posterior = Posterior(search, best, refined)
     asked.clear()
-    there = search.evaluate((*best.members, (settling, group)))
+    there = search.sets.evaluate((*best.members, (settling, group)))
     bare = posterior.evidence(there)
     assert posterior._refined_evidence(there, bare + 4.0) == pytest.approx(bare)
     assert asked == []
@@ -144,7 +144,7 @@ def test_what_is_hardly_there_is_not_said() -> None:
     search, best = drifting(0.0, 0.0)
     assert best.members == ()
     assert Posterior(search, best).probable_causes() == []
-    there = search.evaluate(((CAUSES["cross_coupling"],
+    there = search.sets.evaluate(((CAUSES["cross_coupling"],
                                CAUSES["cross_coupling"].variants[0]),))  # fmt: skip
     assert Posterior(search, there).probable_causes() == [], "another set is likelier"
 

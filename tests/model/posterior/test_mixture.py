@@ -11,14 +11,14 @@ from observed import observe, outputs
 from fieldcal.core.positions import TWO_POSITIONS, Position
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.posterior.mixture import Mixing, Mixture
-from fieldcal.model.search.inference import Inference
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve.base_rate import with_base_rate
+from fieldcal.solve.observation_rows import rows_of_observations
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
-from fieldcal.solve.rows import rows_of_means
 
 SD = 1e-3
 PLACES = tuple(
@@ -42,18 +42,18 @@ def case(off: Array, places: tuple[Position, ...] = PLACES) -> Case:
     """Means of a perfect device that are off by something."""
     perfect = outputs(places, bias=np.zeros(3), scale=np.ones(3))
     seen = observe(places, perfect + off, sigma=SD)
-    recorded = rows_of_means(seen)
+    recorded = rows_of_observations(seen)
     rows = with_base_rate(recorded.rows, np.zeros(3))
     d = ParameterSet(
         rows, np.ones(6), recorded.since_turn, False, ParameterSetOptions()
     )
     nominal = State(np.zeros(6), np.ones(6), np.zeros((len(places), 2)), np.zeros(3))
-    gram = Inference(WindowSystem(rows, d), nominal).gram(
+    gram = GaussNewton(WindowSystem(rows, d), nominal).gram(
         nominal, np.zeros(d.width), None
     )
-    search = Search(d, gram)
-    there = search.evaluate(())
-    found = Mixing(d, gram, there, search.typical_instability).run()
+    sets = Sets(d, gram)
+    there = sets.evaluate(())
+    found = Mixing(d, gram, there, sets.typical_instability).run()
     names = [f"acc_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
     assert found.columns.tolist() == [int(d.columns_for(n)[0]) for n in names]
     design = np.zeros((len(places), 3, 6))

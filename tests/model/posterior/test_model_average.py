@@ -22,6 +22,7 @@ from fieldcal.model.posterior.model_average import (
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.search.selection import Search
+from fieldcal.model.search.variations import visit_variations
 
 SESSION = Session.of(ladder(), ("quadratic", "scale_asymmetry"), 1.0)
 QUADRATIC, ASYMMETRY = SESSION.dictionary.causes
@@ -39,15 +40,15 @@ def search_of(value: Array, seed: int) -> Search:
 def average_of(search: Search) -> tuple[ModelAverage, Set]:
     best = search.run()
     return ModelAverage(
-        Posterior(search, best), [average_over_sizes(search, best)]
+        Posterior(search, best), [average_over_sizes(search.sets, best)]
     ), best
 
 
 def test_averages_are_those_of_draws_from_the_sets() -> None:
     """A quantity that a set has twice is the sum there, one that it lacks is 0."""
     search, rng = search_of(np.array([3e-5, 0.0, 1e-5]), 1), np.random.default_rng(2)
-    one = search.evaluate(((QUADRATIC, QUADRATIC.variants[0]),))
-    two = search.evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
+    one = search.sets.evaluate(((QUADRATIC, QUADRATIC.variants[0]),))
+    two = search.sets.evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
     sets = [(one, 0.3), (two, 0.1)]
     first, last = one.state.columns[0], one.state.columns[-1]
     mean, cov = average_over_sets(
@@ -86,7 +87,7 @@ def test_what_is_in_no_set_counts_as_if_it_were() -> None:
     left = ASYMMETRY.variants[0]
     left = replace(left, part=ASYMMETRY.name, typical=np.full(len(left.columns), 2e-3))
     off = SESSION.noise(rng) + SESSION.design[:, :, group.columns] @ np.full(3, 1e-5)
-    first = SESSION.search(off).evaluate(((cause, group),))
+    first = SESSION.search(off).sets.evaluate(((cause, group),))
     columns, sizes = first.state.columns, first.state.prior_sigma
     at = [int(np.flatnonzero(columns == c)[0]) for c in told]
     steady, pulls = (0,) * len(first.sizes.instability), []
@@ -94,7 +95,7 @@ def test_what_is_in_no_set_counts_as_if_it_were() -> None:
         drawn, more = (s * rng.standard_normal(len(s)) for s in (sizes, left.typical))
         off = SESSION.noise(rng) + SESSION.design[:, :, columns] @ drawn
         off += SESSION.design[:, :, left.columns] @ more
-        rows = SESSION.search(off).gram_at(steady)
+        rows = SESSION.search(off).sets.gram_at(steady)
         there = replace(first, state=Eliminated.of(rows, columns, sizes))
         mean, cov = average_of_columns([(there, 1.0)], told, [left])
         wrong = mean - drawn[at]
@@ -111,7 +112,7 @@ def test_what_is_in_no_set_counts_as_if_it_were() -> None:
     ratio = np.diag(cov) / np.diag(plain)
     assert ratio.max() > 1.5
     # a set that has it knows it
-    has = SESSION.search(off).evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
+    has = SESSION.search(off).sets.evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
     known = average_of_columns([(has, 1.0)], told, [left])[1]
     np.testing.assert_array_equal(known, average_of_columns([(has, 1.0)], told)[1])
 
@@ -141,14 +142,16 @@ def test_where_axes_may_be_turned_other_parameters_are_the_same_device(
     search = search_of(np.array([3e-5, 2e-5, -3e-5]), 7)
     average, _ = average_of(search)
     by = {group.params: group for group in QUADRATIC.variants}
-    first, last = (search.evaluate(((QUADRATIC, by[p]),)) for p in ((0, 1), (1, 2)))
+    first, last = (
+        search.sets.evaluate(((QUADRATIC, by[p]),)) for p in ((0, 1), (1, 2))
+    )
     monkeypatch.setitem(vars(average), "sets", [(first, 0.6), (last, 0.4)])
     member = QUADRATIC, by[0, 1]
     at = [np.flatnonzero(first.state.columns == c)[-1] for c in by[0, 1].columns]
     own = first.state.estimate[at]
     assert average.average_of_member(member)[0][0] == pytest.approx(0.6 * own[0])
-    free = np.ones_like(search.dictionary.unoriented)
-    monkeypatch.setattr(search.dictionary, "unoriented", free)
+    free = np.ones_like(search.sets.dictionary.unoriented)
+    monkeypatch.setattr(search.sets.dictionary, "unoriented", free)
     np.testing.assert_allclose(average.average_of_member(member)[0], own)
 
 
@@ -207,11 +210,11 @@ def test_variants_that_come_near_are_visited(times: float) -> None:
     """Of the same cause, and no others."""
     search = search_of(np.array([3e-5, 4e-6, -3e-5]) * times, 5)
     best = search.run()
-    before = set(search.visited)
-    search.visit_variations(best, best.score)
+    before = set(search.sets.visited)
+    visit_variations(search.sets, best, best.score)
     ((cause, _),) = best.members
-    new = [s for key, s in search.visited.items() if key not in before]
+    new = [s for key, s in search.sets.visited.items() if key not in before]
     assert {c for s in new for c, _ in s.members} <= {cause}
-    every = [search.evaluate(((cause, v),)) for v in cause.variants]
-    near = {search.key(s.members) for s in every if s.score > best.score - 2.0}
-    assert near <= before | {search.key(s.members) for s in new}
+    every = [search.sets.evaluate(((cause, v),)) for v in cause.variants]
+    near = {search.sets.key(s.members) for s in every if s.score > best.score - 2.0}
+    assert near <= before | {search.sets.key(s.members) for s in new}

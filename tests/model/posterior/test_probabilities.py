@@ -24,6 +24,7 @@ from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
+from fieldcal.model.search.set_at_instability import with_typical_calibration
 
 ODDS, DRAWS = 0.5, 220
 """Of a cause, for which the chance of one stands where chances are small."""
@@ -76,7 +77,7 @@ def alike(search: Search) -> list[Array]:
     for first in (0, 3):
         every = np.zeros((len(THREE), 7))
         every[:, first : first + 3] = THREE
-        log = np.asarray(search.instability_log_prior(every))
+        log = np.asarray(search.sets.instability_log_prior(every))
         found.append(np.exp(log - np.logaddexp.reduce(log)))
     return found
 
@@ -107,11 +108,11 @@ def draws() -> tuple[Draw, ...]:
             for g, v in zip(groups, drawn, strict=True)
         ])  # fmt: skip
         value = wide * rng.standard_normal(len(wide))
-        tau = instabilities(rng, shares) * empty.typical_instability
+        tau = instabilities(rng, shares) * empty.sets.typical_instability
         off = SESSION.noise(rng, tau) + design[:, :, columns] @ value
         search = SESSION.search(off)
-        known = Eliminated.of(search.gram.with_instability(tau), columns, wide)
-        found = search.evaluate(members)
+        known = Eliminated.of(search.sets.gram.with_instability(tau), columns, wide)
+        found = search.sets.evaluate(members)
         true = frozenset(c.name for c, _ in members)
         out.append(Draw(true, value, search, search.run(), known, found))
     return tuple(out)
@@ -207,19 +208,19 @@ def test_with_sizes_found_estimates_are_as_near_as_they_say() -> None:
     away = []
     for one in draws():
         count = sum(len(g.columns) for g in SESSION.dictionary.always)
-        state = average_over_sizes(one.search, one.found).state
+        state = average_over_sizes(one.search.sets, one.found).state
         away.append(pulls(state, one.value)[:count])
     assert 0.93 < np.mean(np.abs(np.concatenate(away)) < 1.96) < 0.97
 
 
 def test_what_is_reported_is_the_mean_over_instabilities() -> None:
     one = draws()[1]
-    found = average_over_sizes(one.search, one.found)
-    wide, _ = one.search.with_typical_calibration(one.found)
+    found = average_over_sizes(one.search.sets, one.found)
+    wide, _ = with_typical_calibration(SESSION.dictionary, one.found)
     state = Eliminated.of(one.found.state.rows, one.found.state.columns, wide)
     opened = replace(one.found, state=state)
-    mixed = Mixing(SESSION.dictionary, one.search.gram, opened,
-                   one.search.typical_instability, False).run()  # fmt: skip
+    mixed = Mixing(SESSION.dictionary, one.search.sets.gram, opened,
+                   one.search.sets.typical_instability, False).run()  # fmt: skip
     np.testing.assert_allclose(found.state.estimate, mixed.mean)
     np.testing.assert_allclose(found.state.inverse, mixed.covariance)
     half = found.state.half
@@ -260,10 +261,10 @@ def test_probabilities_are_shares_of_the_sets_that_were_visited() -> None:
 def test_no_probability_is_above_one_however_large_the_evidence() -> None:
     one = next(d for d in draws() if d.best.members)
     posterior = Posterior(one.search, one.best)
-    sets = one.search.visited
+    sets = one.search.sets.visited
     far = {k: replace(s, score=s.score - 123_456.7) for k, s in sets.items()}
     posterior.search = copy(one.search)
-    posterior.search.visited = far
+    posterior.sets.visited = far
     every = {c.name for s in far.values() for c, _ in s.members}
     said = [posterior.probability([name]) for name in every]
     assert max(said) <= 1.0 and posterior.probability_of_noise_alone <= 1.0
@@ -302,7 +303,7 @@ def test_a_cause_that_is_not_excluded_counts_though_the_search_left_it_out() -> 
         for cause in session.dictionary.causes:
             if cause.key in best.keys:
                 continue
-            more = max((session.search(off).evaluate((*best.members, (cause, v)))
+            more = max((session.search(off).sets.evaluate((*best.members, (cause, v)))
                         for v in cause.variants), key=lambda s: s.score)  # fmt: skip
             if more.score > best.score - near:
                 near_ones.append(more.keys in counts)
@@ -319,5 +320,5 @@ def test_what_no_row_tells_from_the_calibration_is_not_shown() -> None:
     for group, size in ((there["gravity_error"], 5.0), (there["bias_drift:acc"], 1.0)):
         off += session.design[:, :, group.columns] @ (size * group.typical)
     search = session.search(off)
-    shown = search.shown_beside(search.evaluate(()))
+    shown = search.offers.shown_in_addition(search.sets.evaluate(()))
     assert not shown(there["gravity_error"]) and shown(there["bias_drift:acc"])

@@ -12,6 +12,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model.posterior.model_average import average_of_columns, average_over_sets
 from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.window_rows import WindowSystem
@@ -30,7 +31,7 @@ def fading(seed: int, both: bool = False) -> InferenceResult:
     d = dictionary(X)
     y = state.output(state.experienced(X), d.since)
     y += SD * np.random.default_rng(seed).standard_normal(y.shape)
-    return Inference(WindowSystem(rows_of(X, y), d), nominal()).run()
+    return Inference(GaussNewton(WindowSystem(rows_of(X, y), d), nominal())).run()
 
 
 def fitted(y: Array, tau: float) -> tuple[Array, float]:
@@ -57,9 +58,9 @@ def test_each_time_constant_is_elsewhere_once_up_and_once_down() -> None:
 
 def test_what_is_found_keeps_its_columns() -> None:
     found = fading(3)
-    width = found.inference.dictionary.width
+    width = found.fit.dictionary.width
     sets_at_other_time_constants(found)
-    assert found.inference.dictionary.width == width
+    assert found.fit.dictionary.width == width
 
 
 def test_an_amplitude_is_uncertain_by_what_the_time_constant_moves_it() -> None:
@@ -67,13 +68,13 @@ def test_an_amplitude_is_uncertain_by_what_the_time_constant_moves_it() -> None:
     found = fading(3)
     ((_, group),) = found.best.members
     at = group.columns[:1]
-    own = average_over_sizes(found.search, found.best)
+    own = average_over_sizes(found.search.sets, found.best)
     (alone,) = np.diag(average_of_columns([(own, 1.0)], at)[1])
     sets = [(s, 0.5) for s in sets_at_other_time_constants(found)]
     (whole,) = np.diag(average_over_sets(sets, lambda s: [
         np.flatnonzero(s.state.columns == s.members[0][1].columns[0])])[1])  # fmt: skip
     tau, sigma = group.shape["tau_s"], group.shape_sigma
-    system = found.inference.system
+    system = found.fit.system
     assert isinstance(system, WindowSystem)
     y = system.rows.y[:, 0]
     ends = [fitted(y, tau * np.exp(s * sigma / tau))[0][2] for s in (-1.0, 1.0)]
@@ -87,7 +88,7 @@ def test_what_does_not_fade_is_nowhere_else() -> None:
     y = np.hstack([X.f, X.w]) + SD * np.random.default_rng(1).standard_normal((54, 6))
     assert (
         sets_at_other_time_constants(
-            Inference(WindowSystem(rows_of(X, y), d), nominal()).run()
+            Inference(GaussNewton(WindowSystem(rows_of(X, y), d), nominal())).run()
         )
         == []
     )

@@ -13,9 +13,12 @@ from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.sets import Set
-from fieldcal.model.search import selection
+from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.evidence.sizing import Sizes
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult
+from fieldcal.model.search.offered_pairs import offered_pairs
+from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.window_rows import WindowSystem
@@ -33,12 +36,12 @@ def state_of(*terms: Term, turned: Array | None = None) -> State:
     return State(BIAS, SCALE, small, np.zeros(3), terms)
 
 
-def inference_of(state: State, seed: int = 2) -> Inference:
+def fit_of(state: State, seed: int = 2) -> GaussNewton:
     """Of rows that a state predicts, with noise."""
     d = dictionary(X)
     y = state.output(state.experienced(X), d.since)
     y += SD * np.random.default_rng(seed).standard_normal(y.shape)
-    return Inference(WindowSystem(rows_of(X, y), d), nominal())
+    return GaussNewton(WindowSystem(rows_of(X, y), d), nominal())
 
 
 SETTLING = Term(
@@ -48,12 +51,12 @@ SETTLING = Term(
 
 @cache
 def settling() -> InferenceResult:
-    return inference_of(state_of(SETTLING)).run()
+    return Inference(fit_of(state_of(SETTLING))).run()
 
 
 def chi2(found: InferenceResult) -> float:
     """Weighted squares of what the state leaves, over the rows."""
-    system = found.inference.system
+    system = found.fit.system
     assert isinstance(system, WindowSystem)
     rows, d = system.rows, system.dictionary
     off = rows.y - found.state.output(found.state.experienced(X), d.since)
@@ -76,7 +79,7 @@ def test_a_time_constant_is_found_between_the_points_of_its_grid() -> None:
 
 
 def test_the_state_is_what_the_columns_say() -> None:
-    found, d = settling(), settling().inference.dictionary
+    found, d = settling(), settling().fit.dictionary
     values = found.values
     np.testing.assert_allclose(found.state.bias, values[d.bias : d.bias + 6])
     np.testing.assert_allclose(found.state.scale, 1 + values[d.scale : d.scale + 6])
@@ -91,11 +94,11 @@ def test_the_state_is_what_the_columns_say() -> None:
 
 def test_a_nominal_state_is_started_from_and_kept() -> None:
     """What a simulation has already is not found once more."""
-    plain = inference_of(state_of(SETTLING))
+    plain = fit_of(state_of(SETTLING))
     near = SCALE + [0.01, -0.006, 0.003, 0.0, 0.0, 0.0]
     start = State(BIAS + 0.01, near, np.zeros((9, 2)), np.zeros(3), (SETTLING,))
     plain.nominal = start
-    found = plain.run()
+    found = Inference(plain).run()
     assert found.best.members == ()
     (term,) = found.state.terms
     assert term.effect is SETTLING.effect and term.shape == SETTLING.shape
@@ -108,7 +111,7 @@ def test_a_nominal_state_is_started_from_and_kept() -> None:
 def test_a_position_far_from_where_it_is_said_to_be_is_followed() -> None:
     turned = np.zeros((len(LADDER), 2))
     turned[4] = np.deg2rad([9.0, -4.0])
-    found = inference_of(state_of(turned=turned)).run()
+    found = Inference(fit_of(state_of(turned=turned))).run()
     ((cause, group),) = found.best.members
     assert (cause.name, group.position) == ("misset", 4)
     np.testing.assert_allclose(found.state.small_rotation, turned, atol=2e-4)
@@ -116,7 +119,7 @@ def test_a_position_far_from_where_it_is_said_to_be_is_followed() -> None:
 
 
 def test_where_nothing_is_the_state_is_bias_and_scale_factor() -> None:
-    found = inference_of(state_of()).run()
+    found = Inference(fit_of(state_of())).run()
     assert found.best.members == () and found.state.terms == ()
     np.testing.assert_allclose(found.state.bias, BIAS, atol=1e-3)
     assert chi2(found) == pytest.approx(1.0, abs=0.2)
@@ -125,15 +128,15 @@ def test_where_nothing_is_the_state_is_bias_and_scale_factor() -> None:
 def test_another_set_is_refined_beside_and_leaves_no_columns() -> None:
     """Its evidence is no less than that at the best point of the grid."""
     found = settling()
-    d = found.inference.dictionary
+    d = found.fit.dictionary
     cause = next(c for c in d.causes if c.key == "settling:gyr")
     whole = [g for g in cause.variants if len(g.columns) == 3]
     (own,) = found.best.members
-    on_grid = [found.search.evaluate((own, (cause, g))).score for g in whole]
+    on_grid = [found.search.sets.evaluate((own, (cause, g))).score for g in whole]
     best = whole[int(np.argmax(on_grid))]
-    there = found.search.evaluate((own, (cause, best)))
+    there = found.search.sets.evaluate((own, (cause, best)))
     width, count = d.width, len(d.bases)
-    refined = found.inference.refine_beside(found, there)
+    refined = found.with_refined_shapes(there)
     assert (d.width, len(d.bases)) == (width, count)
     assert refined.members[0][1] is own[1], "what was found stays"
     assert refined.members[1][1].shape != best.shape
@@ -145,9 +148,9 @@ def test_another_set_is_refined_beside_and_leaves_no_columns() -> None:
 def test_a_settled_state_stays() -> None:
     """About it the estimate is the state itself, column by column."""
     found = settling()
-    inference, d = found.inference, found.inference.dictionary
+    d = found.fit.dictionary
     members = found.best.members
-    state, values, again = inference.settle(found.state, found.values, members)
+    state, values, again = found.fit.settle(found.state, found.values, members)
     sigma = np.sqrt(np.diag(again.state.inverse))
     linear = [c for g in d.always for c in g.columns]
     at = np.isin(again.state.columns, linear)
@@ -157,13 +160,13 @@ def test_a_settled_state_stays() -> None:
 
 
 def test_wanted_are_columns_of_the_set_and_what_is_always_there() -> None:
-    found, d = settling(), settling().inference.dictionary
-    wanted = found.inference.wanted_columns(found.best.members)
+    found, d = settling(), settling().fit.dictionary
+    wanted = found.fit.wanted_columns(found.best.members)
     groups = [*d.always, *(g for _, g in found.best.members)]
     expected = sorted({int(c) for g in groups for c in g.columns})
     assert np.flatnonzero(wanted).tolist() == expected
-    free = Inference(WindowSystem(rows_of(X, X.f @ np.zeros((3, 6))),
-                            dictionary(ladder(6, (2,)))), nominal())  # fmt: skip
+    free = GaussNewton(WindowSystem(rows_of(X, X.f @ np.zeros((3, 6))),
+                              dictionary(ladder(6, (2,)))), nominal())  # fmt: skip
     own = free.dictionary
     some = free.wanted_columns(())
     assert some[own.small_rotation : own.small_rotation + 18].all()
@@ -172,19 +175,20 @@ def test_wanted_are_columns_of_the_set_and_what_is_always_there() -> None:
 def test_the_top_of_a_parabola_is_where_it_is() -> None:
     """Three scores a ratio apart, and how sharp it is."""
     d = dictionary(X)
-    inference = Inference(WindowSystem(rows_of(X, np.zeros((len(X), 6))), d), nominal())
+    fit = GaussNewton(WindowSystem(rows_of(X, np.zeros((len(X), 6))), d), nominal())
+    refinement = Refinement(fit, nominal(), np.zeros(d.width), Sizes((), ()))
     cause = next(c for c in d.causes if c.key == "settling:acc")
     here = cause.variants[4]
     at, sharp = here.shape["tau_s"], 40.0
     top = 0.3 * np.log(FINEST)
     scores = [-0.5 * sharp * (k * np.log(FINEST) - top) ** 2 for k in (0, -1, 1)]
     own = ((cause, here),)
-    ((_, group),) = inference._at_parabola_top(own, own, 0, scores, "tau_s")
+    ((_, group),) = refinement._at_parabola_top(at, own, 0, scores)
     found = group.shape["tau_s"]
     assert found == pytest.approx(at * FINEST**0.3)
     assert group.shape_sigma == pytest.approx(found / sharp**0.5)
     beyond = [0.0, -5.0, 4.0]
-    ((_, group),) = inference._at_parabola_top(own, own, 0, beyond, "tau_s")
+    ((_, group),) = refinement._at_parabola_top(at, own, 0, beyond)
     assert group.shape["tau_s"] == pytest.approx(at * FINEST), "no further than a step"
 
 
@@ -205,7 +209,7 @@ def drawn(seed: int) -> tuple[Search, Set]:
         some = 0.05 * group.typical * rng.standard_normal(len(group.columns))
         off += SESSION.design[:, :, group.columns] @ some
     search = SESSION.search(off)
-    return search, search.evaluate(())
+    return search, search.sets.evaluate(())
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -214,13 +218,12 @@ def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
     found = search._with_two_more(empty, -np.inf)
     assert len(found.members) == 2
     scores = []
-    for table in search.tables(empty):
-        for one, two, worth, (u, v) in search._pairs(empty, table, -np.inf):
-            one, two = replace(one, size=u), replace(two, size=v)
-            scores.append(table.score + worth)
-            both = search.accept(empty, one, two)
-            assert both.keys == {one.member[0].key, two.member[0].key}
-    every = [s for s in search.visited.values() if len(s.members) == 2]
+    for table in search.offers.tables(empty):
+        for pair in offered_pairs(search.sets, empty, table, -np.inf):
+            scores.append(pair.score)
+            both = search.offers.accept(empty, pair.first, pair.second)
+            assert both.keys == {*pair.keys}
+    every = [s for s in search.sets.visited.values() if len(s.members) == 2]
     assert found.score >= max(s.score for s in every) - 0.5
     assert found.score >= max(scores) - 1.0
     assert search._with_two_more(empty, np.inf) is empty, "none comes near"
@@ -239,14 +242,14 @@ class Watched(Search):
 def test_what_costs_much_is_tried_where_nothing_cheap_helps(seed: int) -> None:
     """And by a thorough search alone."""
     one, _ = drawn(seed)
-    quick, whole = (Watched(one.dictionary, one.gram) for _ in range(2))
+    quick, whole = (Watched(Sets(one.sets.dictionary, one.sets.gram)) for _ in range(2))
     best = quick.run(thorough=False)
     assert "asked" not in quick.__dict__
     assert quick._step(best, [quick._with_one_more, quick._with_one_replaced]) is best
     found = whole.run()
     assert found.score >= best.score
     first = whole.__dict__["asked"][0]
-    assert Search.key(first.members) == Search.key(best.members)
+    assert Sets.key(first.members) == Sets.key(best.members)
 
 
 def part_of(whole: Group, count: int) -> Group:
@@ -260,17 +263,15 @@ def test_all_the_parameters_of_a_cause() -> None:
     d: Dictionary = SESSION.dictionary
     cause: Cause = next(c for c in d.causes if c.key == "cross_coupling")
     whole = cause.variants[0]
-    assert selection._full_variant(cause, part_of(whole, 2)) is whole
-    assert selection._full_variant(cause, whole) is whole
+    assert cause.full_variant(part_of(whole, 2)) is whole
+    assert cause.full_variant(whole) is whole
     shaped = replace(part_of(whole, 2), shape={"tau_s": 1.0})
-    assert selection._full_variant(cause, shaped) is shaped
+    assert cause.full_variant(shaped) is shaped
     search, empty = drawn(0)
-    offer = next(o for o in search.offers(empty)
+    offer = next(o for o in search.offers.ranked(empty)
                  if o.member[0].key == "cross_coupling")  # fmt: skip
-    wide = selection._with_all_parameters(
-        replace(offer, member=(cause, part_of(whole, 2)))
-    )
+    wide = replace(offer, member=(cause, part_of(whole, 2))).with_all_parameters()
     assert wide.member == (cause, whole)
     assert (wide.size, wide.instability) == (offer.size, offer.instability)
     same = replace(offer, member=(cause, whole))
-    assert selection._with_all_parameters(same) is same
+    assert same.with_all_parameters() is same

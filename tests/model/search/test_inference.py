@@ -11,7 +11,8 @@ from benchmarks.concealed.draws import sized
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import estimates_by_column
 
@@ -73,7 +74,7 @@ def test_what_was_gone_through_is_not_gone_through_again(
     session = plain(rng, ("wide",)).having({"cross_coupling": {"k12": 0.006}})
     found = explain(prepare_recording(session.record(1), session.about)).inferred
     assert found.best.keys == {"cross_coupling"}
-    assert found.search.key(found.best.members) in found.visited_keys
+    assert Sets.key(found.best.members) in found.visited_keys
     runs: list[Set] = []
     run = Search.run
 
@@ -82,13 +83,13 @@ def test_what_was_gone_through_is_not_gone_through_again(
         return runs[-1]
 
     monkeypatch.setattr(Search, "run", kept)
-    nothing = found.search.evaluate(())
-    again = found.inference.resume(nothing, found)
+    nothing = found.search.sets.evaluate(())
+    again = Inference(found.fit).resume(nothing, found)
     assert again.best.keys == found.best.keys and len(runs) > 1
-    first = Search.key(runs[0].members)
+    first = Sets.key(runs[0].members)
     runs.clear()
-    ended = found.inference.resume(
+    ended = Inference(found.fit).resume(
         nothing, replace(found, visited_keys=frozenset({first}))
     )
-    assert [Search.key(one.members) for one in runs] == [first]
-    assert Search.key(ended.best.members) == first
+    assert [Sets.key(one.members) for one in runs] == [first]
+    assert Sets.key(ended.best.members) == first

@@ -10,9 +10,10 @@ import pytest
 from small_sessions import Session, ladder
 
 from fieldcal.model import priors
-from fieldcal.model.evidence.sets import Set, variant_log_priors
+from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search import offers
+from fieldcal.model.search.group_gains import GroupGains
 from fieldcal.model.search.offer import Offer
 from fieldcal.model.search.selection import PREDICTION_SLACK, Search
 
@@ -32,13 +33,13 @@ def drawn(seed: int = 1) -> Search:
 
 def having(search: Search, *keys: str) -> Set:
     members = tuple((CAUSES[k], CAUSES[k].variants[0]) for k in keys)
-    return search.evaluate(members)
+    return search.sets.evaluate(members)
 
 
 def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
     search = drawn()
     there = having(search, "bias_drift:acc", "time:acc")
-    share, apart = search._cause_log_priors(there)
+    share, apart = search.offers.cause_log_priors(there)
     found = dict(zip(KEYS, share, strict=True))
     assert not apart, "the variants of each are alike"
     for key, cause in CAUSES.items():
@@ -46,7 +47,7 @@ def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
         chance = priors.COMPANION_CHANCE if again else cause.chance
         assert found[key] == pytest.approx(np.log(chance / len(cause.variants)))
     np.testing.assert_array_equal(
-        search._cause_log_priors(search.evaluate(()))[0],
+        search.offers.cause_log_priors(search.sets.evaluate(()))[0],
         SESSION.dictionary.cause_log_priors,
     )
 
@@ -54,17 +55,17 @@ def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
 def test_each_cause_that_a_set_has_not_is_offered_once_the_best_first() -> None:
     search = drawn()
     there = having(search, "cross_coupling")
-    offers = search.offers(there)
+    offers = search.offers.ranked(there)
     keys = [o.member[0].key for o in offers]
     assert len(set(keys)) == len(keys) and "cross_coupling" not in keys
     scores = [o.score for o in offers]
     assert scores == sorted(scores, reverse=True)
     assert keys[0] == "bias_drift:acc" and scores[0] > there.score + 10
-    every = [o for t in search.tables(there) for o in t.offers]
+    every = [o for t in search.offers.tables(there) for o in t.offers]
     for offer in offers:
         same = [o.score for o in every if o.member[0].key == offer.member[0].key]
         assert offer.score == max(same)
-    assert search.tables(there) is search.tables(there), "asked once"
+    assert search.offers.tables(there) is search.offers.tables(there), "asked once"
 
 
 def test_what_is_taken_begins_with_the_sizes_that_were_offered(
@@ -72,10 +73,10 @@ def test_what_is_taken_begins_with_the_sizes_that_were_offered(
 ) -> None:
     search = drawn()
     there = having(search, "cross_coupling")
-    one, two = search.offers(there)[:2]
+    one, two = search.offers.ranked(there)[:2]
     begun: list[tuple[tuple[Member, ...], Sizes]] = []
-    monkeypatch.setattr(search, "evaluate", lambda m, s: begun.append((m, s)))
-    search.accept(there, one, two)
+    monkeypatch.setattr(search.sets, "evaluate", lambda m, s: begun.append((m, s)))
+    search.offers.accept(there, one, two)
     ((members, start),) = begun
     assert members == (*there.members, one.member, two.member)
     assert start.calibration == there.sizes.calibration
@@ -90,8 +91,9 @@ def test_wide_groups_are_looked_up_where_rows_say_the_same_of_them() -> None:
     root = rng.standard_normal((3, 40, 40))
     inner = root @ root.swapaxes(1, 2)
     rhs, own = rng.standard_normal((3, 40)), np.full(3, 80.0)
-    found = search._gains(inner, rhs, own)
-    again = search._gains(inner[::-1], rhs[::-1], own)
+    gains = GroupGains(search.sets).gains
+    found = gains(inner, rhs, own)
+    again = gains(inner[::-1], rhs[::-1], own)
     np.testing.assert_array_equal(found, again[::-1])
     at = int(np.argmin(np.abs(np.log(priors.SIZES))))
     v = float(priors.SIZES[at])
@@ -114,13 +116,13 @@ def test_what_wanders_far_above_the_noise_is_offered_by_all_its_waves(
 
     def offered() -> Offer:
         search = session.search(off)
-        (offer,) = search.offers(search.evaluate(()))
+        (offer,) = search.offers.ranked(search.sets.evaluate(()))
         return offer
 
     by_some = offered()
     monkeypatch.setattr(offers, "MAX_COSINES", 20)
     by_all, search = offered(), session.search(off)
-    found = search.accept(search.evaluate(()), by_all)
+    found = search.offers.accept(search.sets.evaluate(()), by_all)
     assert by_all.score == pytest.approx(found.score, abs=8.0)
     assert by_all.score > by_some.score + 20
 
@@ -181,8 +183,8 @@ def test_what_no_row_shows_of_a_restart_is_offered_all_the_same(off: bool) -> No
     d.expect_within([(100.0, 160.0)] if off else [])
     acc, gyr = d.causes
     search = session.search(np.zeros((len(d.x), 6)))
-    there = search.evaluate(((gyr, gyr.variants[-1]),))
-    found = {o.member[0].key: o for o in search.offers(there)}
+    there = search.sets.evaluate(((gyr, gyr.variants[-1]),))
+    found = {o.member[0].key: o for o in search.offers.ranked(there)}
     assert bool(acc.expected) == off == (acc.key in found)
     if off:
         offer = found[acc.key]
@@ -201,28 +203,28 @@ def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -
     assert found["acc"] == pytest.approx(found["gyr"])
     search = JUMPS.search(off)
     acc, gyr = (next(m for m in best.members if m[0] is c) for c in (ACC, GYR))
-    assert search.set_log_prior((acc, gyr)) == pytest.approx(
-        search.set_log_prior((gyr, acc))
+    assert search.sets.set_log_prior((acc, gyr)) == pytest.approx(
+        search.sets.set_log_prior((gyr, acc))
     )
-    both = search.evaluate((gyr, acc))
-    offered = search.offers(search.evaluate((gyr,)), both.sizes)
+    both = search.sets.evaluate((gyr, acc))
+    offered = search.offers.ranked(search.sets.evaluate((gyr,)), both.sizes)
     (offer,) = [o for o in offered if o.member[0] is ACC]
     assert offer.member[1].shape == acc[1].shape
-    taken = search.accept(search.evaluate((gyr,)), offer)
+    taken = search.offers.accept(search.sets.evaluate((gyr,)), offer)
     assert abs(taken.score - offer.score) < 2 * PREDICTION_SLACK
 
 
 def test_what_is_known_from_elsewhere_stays_so_large_beside_every_offer() -> None:
     """Gravity is known so well: held to nothing, it would make offers look better."""
     plain = drawn()
-    d = copy(plain.dictionary)
+    d = copy(plain.sets.dictionary)
     d.always = [replace(g, in_state=False) for g in d.always]
-    search = Search(d, plain.gram)
-    nothing = search.evaluate(())
+    search = Search(Sets(d, plain.sets.gram))
+    nothing = search.sets.evaluate(())
     known = [g.columns for g in d.always if g.fixed_size is not None]
     at = np.isin(nothing.state.columns, np.concatenate(known))
     assert at.any()
-    for table in search.tables(nothing):
+    for table in search.offers.tables(nothing):
         np.testing.assert_array_equal(
             table.state.prior_sigma[at], nothing.state.prior_sigma[at]
         )

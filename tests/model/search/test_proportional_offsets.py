@@ -8,18 +8,18 @@ from small_sessions import LADDER, SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.search.proportional_offsets import proportional_causes
-from fieldcal.model.search.selection import Search
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
 
 X = ladder()
 
 
-def searched(off: Array, d: Dictionary) -> Search:
+def searched(off: Array, d: Dictionary) -> Sets:
     y = np.hstack([X.f, X.w]) + off
     linear = WindowSystem(rows_of(X, y), d).linearised(nominal())
-    return Search(d, gram(linear, d, np.zeros(d.width)))
+    return Sets(d, gram(linear, d, np.zeros(d.width)))
 
 
 def noisy(seed: int) -> tuple[Array, np.random.Generator]:
@@ -31,10 +31,10 @@ def risen(off: Array, part: str) -> float:
     """By how much the group of one proportion raises the weight of nothing, ln."""
     d = dictionary(X)
     d.add_causes(list(proportional_causes(d, [searched(off, d).evaluate(())])))
-    search = searched(off, d)
+    sets = searched(off, d)
     (cause,) = (c for c in d.causes if c.key == f"position:{part}")
-    there = search.evaluate(((cause, cause.variants[0]),))
-    return there.score - search.evaluate(()).score
+    there = sets.evaluate(((cause, cause.variants[0]),))
+    return there.score - sets.evaluate(()).score
 
 
 @pytest.mark.parametrize("proportion", [(2e-2, -1.5e-2, 1e-2), (0.0, 0.0, 2e-2)])

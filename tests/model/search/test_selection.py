@@ -19,6 +19,7 @@ from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.pairs import pair_gains
 from fieldcal.model.search.selection import Search
+from fieldcal.model.search.variations import widen_outputs
 
 DENSITY = np.log(priors.density())
 EVEN = int(np.argmin(np.abs(np.log(SIZES))))
@@ -78,8 +79,8 @@ def true_and_found(keys: Sequence[str], seed: int) -> tuple[Set, Set]:
     off = SESSION.noise(rng, unstable(0.1)) + made([g for _, g in members], rng)
     search = SESSION.search(off)
     best = search.run()
-    assert best.score == max(s.score for s in search.visited.values())
-    return search.evaluate(members), best
+    assert best.score == max(s.score for s in search.sets.visited.values())
+    return search.sets.evaluate(members), best
 
 
 @pytest.mark.parametrize(
@@ -111,8 +112,8 @@ def test_a_step_is_on_as_many_outputs_as_show_it(second: float, more: bool) -> N
     size = at[3, 4, 5].typical * np.array([0.05, second, 0.0])
     off += session.design[:, :, at[3, 4, 5].columns] @ size
     search = session.search(off)
-    alone = search.evaluate(((step, at[3,]),))
-    found = search.widen_outputs(alone)
+    alone = search.sets.evaluate(((step, at[3,]),))
+    found = widen_outputs(search.sets, alone)
     assert (found.members[0][1] is at[3, 4, 5]) == more
     assert (found.score > alone.score + 3) if more else found is alone
 
@@ -154,7 +155,7 @@ def test_what_pairs_gain_is_what_their_sets_gain(seed: int) -> None:
     groups = [c.variants[0] for c in CAUSES.values()]
     off = KNOWN.noise(rng) + made(groups[:3], rng, 0.02)
     search = KNOWN.search(off)
-    empty = search.evaluate(())
+    empty = search.sets.evaluate(())
     seen = set()
     alone = [EVEN] * len(groups)
     for gain, (i, j), (u, v) in pair_gains(empty.state, groups, alone):
@@ -163,7 +164,7 @@ def test_what_pairs_gain_is_what_their_sets_gain(seed: int) -> None:
         assert gain == pytest.approx(expected, rel=1e-9, abs=1e-7)
         members = tuple((c, c.variants[0]) for c in [*CAUSES.values()])
         start = replace(empty.sizes, members=(u, v))
-        both = search.evaluate((members[i], members[j]), start)
+        both = search.sets.evaluate((members[i], members[j]), start)
         found = with_sizes(empty, two, both.sizes.members) - empty.state.score
         assert -1e-7 <= found - gain < 1.0, "the likeliest sizes of the pair"
         seen.add((i, j))
@@ -179,8 +180,10 @@ def test_sizes_are_those_that_trying_all_finds(
     rng = np.random.default_rng(seed)
     two = [CAUSES[key].variants[0] for key in keys]
     search = KNOWN.search(KNOWN.noise(rng) + made(two, rng, 0.3))
-    found = search.evaluate(tuple((CAUSES[k], CAUSES[k].variants[0]) for k in keys))
-    empty = search.evaluate(())
+    found = search.sets.evaluate(
+        tuple((CAUSES[k], CAUSES[k].variants[0]) for k in keys)
+    )
+    empty = search.sets.evaluate(())
     some = range(12, 24)
     every = np.array([[with_sizes(empty, two, (u, v)) for v in some] for u in some])
     u, v = np.unravel_index(every.argmax(), every.shape)
@@ -203,14 +206,14 @@ def test_instabilities_are_those_that_trying_all_finds(seed: int) -> None:
     rng = np.random.default_rng(seed)
     tau = known.dictionary.typical_instability * 2.0 * np.exp(rng.normal(0, 0.3, 7))
     search = known.search(known.noise(rng, tau))
-    found, some = search.evaluate(()), range(12, 23)
+    found, some = search.sets.evaluate(()), range(12, 23)
     columns, wide = found.state.columns, found.state.prior_sigma
-    small = search.gram.select_columns(columns)
+    small = search.sets.gram.select_columns(columns)
 
     def score(x: int, y: int, z: int) -> float:
         sizes = np.array([SIZES[i] for i in (x, y, z, 0, 0, 0, 0)])
         rows = small.with_instability(sizes * known.dictionary.typical_instability)
-        prior = search.instability_log_prior((x, y, z, 0, 0, 0, 0))
+        prior = search.sets.instability_log_prior((x, y, z, 0, 0, 0, 0))
         return Eliminated.of(rows, columns, wide).score + float(prior)
 
     every = {(x, y, z): score(x, y, z) for x in some for y in some for z in some}
@@ -221,42 +224,42 @@ def test_instabilities_are_those_that_trying_all_finds(seed: int) -> None:
 def test_instabilities_of_a_triad_are_likelier_alike() -> None:
     search = SESSION.search(SESSION.noise(np.random.default_rng(0)))
     even = (16, 16, 16, 12, 12, 12, 0)
-    level = search.instability_log_prior(even)
+    level = search.sets.instability_log_prior(even)
     for unlike in ((14, 16, 18), (16, 16, 13), (20, 14, 14)):
-        assert search.instability_log_prior((*unlike, *even[3:])) < level - 2
-        assert search.instability_log_prior(
+        assert search.sets.instability_log_prior((*unlike, *even[3:])) < level - 2
+        assert search.sets.instability_log_prior(
             (*even[:3], *unlike, 0)
-        ) < search.instability_log_prior((*even[:3], 16, 16, 16, 0))
-    assert search.instability_log_prior((12, 12, 12, 16, 16, 16, 0)) == pytest.approx(
-        level
-    )
+        ) < search.sets.instability_log_prior((*even[:3], 16, 16, 16, 0))
+    assert search.sets.instability_log_prior(
+        (12, 12, 12, 16, 16, 16, 0)
+    ) == pytest.approx(level)
     larger = [
-        search.instability_log_prior((*[i] * 3, 12, 12, 12, 0))
+        search.sets.instability_log_prior((*[i] * 3, 12, 12, 12, 0))
         for i in range(len(SIZES))
     ]
     assert (np.diff(larger) <= 0).all() and larger[24] < larger[16] - 10
     many = np.array([even, (14, 16, 18, 12, 12, 12, 0)])
     np.testing.assert_allclose(
-        search.instability_log_prior(many),
-        [search.instability_log_prior(row) for row in many],
+        search.sets.instability_log_prior(many),
+        [search.sets.instability_log_prior(row) for row in many],
     )
 
 
 def test_the_chance_of_a_set_is_that_of_its_causes() -> None:
     """The other triad of an effect that is there is likelier than by itself."""
-    search = Session.of(ladder(), ("settling:acc", "settling:gyr", "alpha:ay"))
-    by_key = {c.key: c for c in search.dictionary.causes}
+    session = Session.of(ladder(), ("settling:acc", "settling:gyr", "alpha:ay"))
+    by_key = {c.key: c for c in session.dictionary.causes}
     acc, gyr, other = by_key.values()
-    found = search.search(search.noise(np.random.default_rng(0)))
+    sets = session.search(session.noise(np.random.default_rng(0))).sets
     first = (acc, acc.variants[0])
-    assert found.set_log_prior([]) == 0.0
-    assert found.set_log_prior([first]) == pytest.approx(
+    assert sets.set_log_prior([]) == 0.0
+    assert sets.set_log_prior([first]) == pytest.approx(
         np.log(acc.chance / len(acc.variants))
     )
-    both = found.set_log_prior([first, (gyr, gyr.variants[3])])
+    both = sets.set_log_prior([first, (gyr, gyr.variants[3])])
     again = np.log(priors.COMPANION_CHANCE / len(gyr.variants))
-    assert both == pytest.approx(found.set_log_prior([first]) + again)
-    three = found.set_log_prior(
+    assert both == pytest.approx(sets.set_log_prior([first]) + again)
+    three = sets.set_log_prior(
         [first, (gyr, gyr.variants[3]), (other, other.variants[0])]
     )
     assert three == pytest.approx(both + np.log(priors.UNKNOWN_FUNCTION_CHANCE))
@@ -268,13 +271,15 @@ def test_an_offer_foretells_the_set_with_it() -> None:
     search: Search = KNOWN.search(
         KNOWN.noise(rng) + made([CAUSES["angle_offset"].variants[0]], rng, 0.1)
     )
-    empty = search.evaluate(())
-    offers = search.offers(empty)
+    empty = search.sets.evaluate(())
+    offers = search.offers.ranked(empty)
     assert offers[0].member[0].key == "angle_offset"
     for offer in offers:
         predicted = offer.score
-        assert search.accept(empty, offer).score == pytest.approx(predicted, rel=1e-9)
-        assert offer.size == search.accept(empty, offer).sizes.members[0]
+        assert search.offers.accept(empty, offer).score == pytest.approx(
+            predicted, rel=1e-9
+        )
+        assert offer.size == search.offers.accept(empty, offer).sizes.members[0]
 
 
 @pytest.mark.parametrize(
@@ -285,11 +290,11 @@ def test_several_effects_are_likelier_than_a_function_that_none_makes(
 ) -> None:
     """Together, though each alone is a little less likely than it."""
     search = SESSION.search(np.zeros((len(SESSION.dictionary.x), 6)))
-    empty = search.evaluate(())
+    empty = search.sets.evaluate(())
     scores = {"alpha:ay": 0.0, "angle_offset": worth[0], "settling:acc": worth[1]}
     sets = {k: replace(empty, members=(there(k),), score=v) for k, v in scores.items()}
     assert CAUSES["alpha:ay"].kind == "unknown"
-    search.visited = {search.key(s.members): s for s in sets.values()}
-    search.visited[()] = replace(empty, score=-9.0)
+    search.sets.visited = {search.sets.key(s.members): s for s in sets.values()}
+    search.sets.visited[()] = replace(empty, score=-9.0)
     assert search._prefer_effects(sets["alpha:ay"]) is sets[told]
     assert search._prefer_effects(sets["settling:acc"]) is sets["settling:acc"]

@@ -10,9 +10,11 @@ from small_sessions import SD, G, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.search.inference import Inference, InferenceResult
+from fieldcal.model.search.gauss_newton import GaussNewton
+from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.settled_scores import correct_scores
 from fieldcal.model.system.linear_system import gram
@@ -39,12 +41,12 @@ def linear_outputs(turn: float) -> Array:
     return outputs(0.0) + slope * turn
 
 
-def about_nominal(y: Array) -> tuple[Dictionary, Search, Inference, Rows]:
+def about_nominal(y: Array) -> tuple[Dictionary, Search, GaussNewton, Rows]:
     x = ladder()
     d, rows = dictionary(x), rows_of(x, y)
     system = WindowSystem(rows, d)
-    search = Search(d, gram(system.linearised(nominal()), d, np.zeros(d.width)))
-    return d, search, Inference(system, nominal()), rows
+    search = Search(Sets(d, gram(system.linearised(nominal()), d, np.zeros(d.width))))
+    return d, search, GaussNewton(system, nominal()), rows
 
 
 def member(d: Dictionary, key: str) -> Member:
@@ -57,10 +59,10 @@ def explained_by(y: Array, key: str) -> tuple[InferenceResult, Search, Member]:
 
     Its best set has one cause.
     """
-    d, search, inference, _ = about_nominal(y)
-    best = search.evaluate((member(d, key),))
+    d, search, fit, _ = about_nominal(y)
+    best = search.sets.evaluate((member(d, key),))
     found = InferenceResult(
-        inference, search, best, nominal(), np.zeros(d.width), [], (), frozenset()
+        fit, search, best, nominal(), np.zeros(d.width), [], (), frozenset()
     )
     return found, search, member(d, f"misset {LAST}")
 
@@ -89,26 +91,26 @@ def test_a_set_has_the_score_that_it_would_have_if_rows_were_linear(
     turn, rng = np.deg2rad(turn_deg), np.random.default_rng(1)
     noise = SD * rng.standard_normal((len(ladder()), 6))
     found, search, angles = explained_by(outputs(turn) + noise, "base_tilt")
-    there = search.evaluate((angles,))
+    there = search.sets.evaluate((angles,))
     found = replace(found, best=there)  # nearest of all, though not about its own state
-    search.evaluate(())
+    search.sets.evaluate(())
     correct_scores(found)
-    assert not search.corrections, "the best set is the one that rows are about"
+    assert not search.sets.corrections, "the best set is the one that rows are about"
 
     found, search, angles = explained_by(outputs(turn) + noise, "base_tilt")
-    there = search.evaluate((angles,))
+    there = search.sets.evaluate((angles,))
     found = replace(found, best=replace(found.best, score=there.score))
     correct_scores(found)
-    plain = about_nominal(linear_outputs(turn) + noise)[1]
+    plain = about_nominal(linear_outputs(turn) + noise)[1].sets
     wanted = plain.evaluate((member(plain.dictionary, f"misset {LAST}"),)).score
     assert there.score < wanted - 2.0, "the square of the angle counts as scatter"
-    assert search.corrected_score(there) == pytest.approx(wanted, abs=0.3)
+    assert search.sets.corrected_score(there) == pytest.approx(wanted, abs=0.3)
 
 
 def test_a_small_angle_needs_no_correction() -> None:
     found, search, angles = explained_by(outputs(np.deg2rad(0.05)), "base_tilt")
-    there = search.evaluate((angles,))
+    there = search.sets.evaluate((angles,))
     found = replace(found, best=replace(found.best, score=there.score))
     correct_scores(found)
-    assert search.corrections == {}
-    assert search.corrected_score(there) == there.score
+    assert search.sets.corrections == {}
+    assert search.sets.corrected_score(there) == there.score

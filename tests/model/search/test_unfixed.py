@@ -13,9 +13,9 @@ from benchmarks.hand_held.draws import GRAVITY, log
 from fieldcal.cli import main
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare_recording
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes
 from fieldcal.model.search.inference import MAX_KEPT_STEP
-from fieldcal.model.search.selection import Search
 from fieldcal.session.folder import Session
 
 EVERY = {"cross_coupling", "gyro_cross_coupling", "gyro_scale"}
@@ -50,7 +50,7 @@ def test_three_effects_are_found_of_which_none_is_seen_alone(seed: int) -> None:
 def test_the_state_stays_where_the_set_does() -> None:
     """Another step about rows of turns that are linearised there is a small one."""
     inferred = explained(88_000_036).inferred
-    own, best = inferred.inference, inferred.best
+    own, best = inferred.fit, inferred.best
     own.gram(inferred.state, inferred.values, None)
     _, moved, _ = own.settle(inferred.state, inferred.values, best.members, best.sizes)
     assert own.largest_step(best, inferred.values, moved) < MAX_KEPT_STEP
@@ -59,7 +59,7 @@ def test_the_state_stays_where_the_set_does() -> None:
 def test_how_a_position_lies_moves_no_closure() -> None:
     """It is read from accelerometers, whatever they couple, bend or are biased by."""
     inferred = explained(88_000_036).inferred
-    own = inferred.inference
+    own = inferred.fit
     own.gram(inferred.state, inferred.values, None)
     coupled = [t for t in inferred.state.terms if t.effect.id == "cross_coupling"]
     assert np.abs(np.concatenate([t.values for t in coupled])).max() > 4e-3
@@ -74,7 +74,7 @@ def test_sizes_do_not_hang_on_where_they_begin() -> None:
     """Of |f| each axis alone may do without its scatter, all three together not."""
     found = explained(88_001_001)
     assert "temperature_bias" in {one.name for one in found.probable_causes}
-    dictionary, gram = found.dictionary, found.inferred.search.gram
+    dictionary, gram = found.dictionary, found.inferred.search.sets.gram
     causes = {cause.key: cause for cause in dictionary.causes}
     even = (UNIT_INDEX,) * len(dictionary.always)
     for key in ("temperature_bias:gyr", "bias_drift:gyr", "cross_coupling"):
@@ -84,7 +84,6 @@ def test_sizes_do_not_hang_on_where_they_begin() -> None:
             *(Sizes(even, (n,) * 3 + (0,) * 4, (UNIT_INDEX,)) for n in (24, 29)),
         ]
         scores = [
-            Search(dictionary, gram).evaluate((member,), start).score
-            for start in starts
+            Sets(dictionary, gram).evaluate((member,), start).score for start in starts
         ]
         assert max(scores) - min(scores) < 5.0

@@ -7,8 +7,8 @@ import pytest
 from dense_model import shared
 from small_sessions import SD, dictionary, ladder, nominal, rows_of
 
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
@@ -26,9 +26,9 @@ def fitted() -> FittedSet:
     values = np.zeros(d.width)
     values[d.bias : d.bias + 3] = 0.01
     linear = WindowSystem(rows, d).linearised(nominal())
-    search = Search(d, gram(linear, d, values))
+    sets = Sets(d, gram(linear, d, values))
     walk = next(c for c in d.causes if c.key == "random_walk:gyr")
-    there = search.evaluate(((walk, walk.variants[0]),))
+    there = sets.evaluate(((walk, walk.variants[0]),))
     return FittedSet(rows, d, linear, values, there)
 
 

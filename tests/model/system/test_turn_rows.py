@@ -12,8 +12,7 @@ from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.columns import RowView
-from fieldcal.model.evidence.sets import Set
-from fieldcal.model.search.selection import Search
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.state import Term
 from fieldcal.model.system import turn_rows, way_rows
 from fieldcal.model.system.linear_system import gram
@@ -101,11 +100,11 @@ def test_outputs_change_with_the_force_by_all_that_reads_it() -> None:
 def test_what_no_physics_makes_of_accelerometers_at_rest_is_strange() -> None:
     d = dictionary(X)
     linear = WindowSystem(rows_of(X, np.hstack([X.f, X.w])), d).linearised(nominal())
-    search = Search(d, gram(linear, d, np.zeros(d.width)))
+    sets = Sets(d, gram(linear, d, np.zeros(d.width)))
     causes = {c.key: c for c in d.causes}
 
     def having(key: str) -> Set:
-        return search.evaluate(((causes[key], causes[key].variants[0]),))
+        return sets.evaluate(((causes[key], causes[key].variants[0]),))
 
     assert turn_rows._has_unknown_acc_cause(
         having("time:ay")

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import build_inference
+from fieldcal.diagnosis.explain import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.filtered_turns import FILTERED
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.posterior.held_out import held_out_turn_residuals
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.inference import Inference
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import Term
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.linear_system import gram
@@ -67,7 +66,7 @@ class Ride:
 
     Attributes
     ----------
-    inference : of its rows
+    fit : of its rows
     group, true : the error's columns, and their true values
     values : (k,) the same among all columns
     known : what windows say
@@ -75,7 +74,7 @@ class Ride:
 
     """
 
-    inference: Inference
+    fit: GaussNewton
     group: Group
     true: Array
     values: Array
@@ -105,8 +104,8 @@ def recorded(*errors: SimulatedEffect) -> tuple[Block, list[HeldWindow]]:
 
 def followed(
     block: Block, windows: list[HeldWindow]
-) -> tuple[Inference, Set, list[TurnRows]]:
-    """The inference of a ride, what windows say, and rows of turns about nominal."""
+) -> tuple[GaussNewton, Set, list[TurnRows]]:
+    """The fit of a ride, what windows say, and rows of turns about nominal."""
     places = [
         {"alpha_deg": a, "beta_deg": b, "start_s": w.start, "end_s": w.end}
         for (a, b), w in zip(PLACES, windows, strict=True)
@@ -116,19 +115,19 @@ def followed(
         "site": {"latitude_deg": 50.45, "height_m": 170.0},
     })  # fmt: skip
     prepared = prepare_recording(block, about)
-    inference = build_inference(prepared.source, prepared.rows, prepared)
-    d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
-    linear = inference.system.linearised(inference.nominal)
-    known = Search(d, gram(linear, d, at_rest)).evaluate(())
-    assert inference.turns is not None
-    turns = inference.turns.linearised(inference.nominal, at_rest, linear, known)
-    return inference, known, turns
+    fit = build_fit(prepared.source, prepared.rows, prepared)
+    d, at_rest = fit.dictionary, np.zeros(fit.dictionary.width)
+    linear = fit.system.linearised(fit.nominal)
+    known = Sets(d, gram(linear, d, at_rest)).evaluate(())
+    assert fit.turns is not None
+    turns = fit.turns.linearised(fit.nominal, at_rest, linear, known)
+    return fit, known, turns
 
 
 @cache
 def ride(name: str) -> Ride:
-    inference, known, turns = followed(*recorded(checked_effect(name, ERRORS[name])))
-    d = inference.dictionary
+    fit, known, turns = followed(*recorded(checked_effect(name, ERRORS[name])))
+    d = fit.dictionary
     group = next(c for c in d.causes if c.name == name).variants[0]
     assert group.effect is not None
     sizes = {
@@ -143,7 +142,7 @@ def ride(name: str) -> Ride:
     ])  # fmt: skip
     values = np.zeros(d.width)
     values[group.columns] = true
-    return Ride(inference, group, true, values, known, turns)
+    return Ride(fit, group, true, values, known, turns)
 
 
 @every_error
@@ -181,12 +180,12 @@ def test_the_way_is_what_the_columns_foretell(name: str) -> None:
 @pytest.mark.parametrize("name", ["gyro_scale", "gyro_cross_coupling"])
 def test_about_the_true_state_there_is_nothing_left(name: str) -> None:
     one = ride(name)
-    inference = one.inference
+    fit = one.fit
     term = Term(one.group.effect, one.true)  # type: ignore[arg-type]
-    state = replace(inference.nominal, terms=(*inference.nominal.terms, term))
-    linear = inference.system.linearised(state)
-    assert inference.turns is not None
-    for turn in inference.turns.linearised(state, one.values, linear, one.known):
+    state = replace(fit.nominal, terms=(*fit.nominal.terms, term))
+    linear = fit.system.linearised(state)
+    assert fit.turns is not None
+    for turn in fit.turns.linearised(state, one.values, linear, one.known):
         predicted = turn.design @ one.values[turn.columns]
         size = np.linalg.norm(turn.closure)
         assert np.linalg.norm(turn.closure - predicted) < 1e-4 * size + 1e-6
@@ -208,8 +207,8 @@ def test_a_filter_is_what_its_columns_foretell(acc: float, gyr: float) -> None:
     a filter of one triad is a delay first of all, whose own square is another column's.
     """
     low_pass = checked_effect("bandwidth", {"acc": acc, "gyr": gyr})
-    inference, _, turns = followed(*recorded(low_pass))
-    d = inference.dictionary
+    fit, _, turns = followed(*recorded(low_pass))
+    d = fit.dictionary
     filters = next(g for g in d.always if g.part == FILTERED)
     values = np.zeros(d.width)
     of_low_pass = [(tau**2, 2 * tau**3, 3 * tau**4) for tau in (acc, gyr)]
@@ -247,11 +246,11 @@ def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
     ]
     about = {"format": 1, "position": places, "nominal": {"gyr_scale": [2.0] * 3}}
     prepared = prepare_recording(block, parse_description(about))
-    inference = build_inference(prepared.source, prepared.rows, prepared)
-    d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
-    linear = inference.system.linearised(inference.nominal)
-    assert inference.turns is not None and not d.unoriented.any()
-    turns = inference.turns.linearised(inference.nominal, at_rest, linear, None)
+    fit = build_fit(prepared.source, prepared.rows, prepared)
+    d, at_rest = fit.dictionary, np.zeros(fit.dictionary.width)
+    linear = fit.system.linearised(fit.nominal)
+    assert fit.turns is not None and not d.unoriented.any()
+    turns = fit.turns.linearised(fit.nominal, at_rest, linear, None)
     noise = float(np.sqrt((prepared.rows.noise[3:] ** 2).mean()))
     for turn in turns:
         sigma = noise / 2.0 * np.sqrt((TURN_S + 2.0) / 100.0)
@@ -262,13 +261,13 @@ def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
 def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
     """(1) of `way_rows`, against walks that are drawn and carried along the turn."""
     one = ride("gyro_scale")
-    inference, state = one.inference, one.inference.nominal
-    assert inference.turns is not None
-    turning = inference.turns.tracker
+    fit, state = one.fit, one.fit.nominal
+    assert fit.turns is not None
+    turning = fit.turns.tracker
     turn = next(iter(turning.turns(state)))
     since = turning.time_since_turn(turn.x.t, turn.positions[1])
     view, noise = RowView(turn.x, turn.x, since, state), np.repeat([0.0, 1e-2], 3)
-    found = WayRows(turn, view, inference.dictionary, one.known, noise)._covariance()
+    found = WayRows(turn, view, fit.dictionary, one.known, noise)._covariance()
     rng, gaps = np.random.default_rng(1), np.diff(turn.x.t)
     density = noise[3] * np.sqrt(turn.interval)
     steps = density * rng.standard_normal((1500, len(gaps), 3)) * gaps[:, None] ** 0.5
@@ -277,7 +276,7 @@ def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
     rows = turn.means(turn.force_error(np.moveaxis(phi, 0, 2)))
     spread = np.cov(rows.reshape(-1, 1500))
     sizes = SIZES[list(one.known.sizes.instability)][:3]
-    loose = sizes * inference.dictionary.typical_instability[:3]
+    loose = sizes * fit.dictionary.typical_instability[:3]
     cov = found - np.diag((turn.sd**2).ravel())
     own = np.diag(cov).reshape(-1, 3) - 2 * loose**2
     drawn = np.diag(spread).reshape(-1, 3)
@@ -295,17 +294,17 @@ def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
 def test_turns_are_foretold_from_windows_and_the_other_turns() -> None:
     """With the scale factors in the set: without them a closure is far off."""
     one = ride("gyro_scale")
-    inference, d = one.inference, one.inference.dictionary
-    assert isinstance(inference.system, WindowSystem)
-    linear = inference.system.linearised(inference.nominal)
+    fit, d = one.fit, one.fit.dictionary
+    assert isinstance(fit.system, WindowSystem)
+    linear = fit.system.linearised(fit.nominal)
     at_rest = np.zeros(d.width)
     rows = gram(linear, d, at_rest, one.turns)
     cause = next(c for c in d.causes if c.name == "gyro_scale")
-    search = Search(d, rows)
+    sets = Sets(d, rows)
     missed = []
     for members in ((), ((cause, one.group),)):
-        there = search.evaluate(members)
-        fitted = FittedSet(inference.system.rows, d, linear, at_rest, there)
+        there = sets.evaluate(members)
+        fitted = FittedSet(fit.system.rows, d, linear, at_rest, there)
         missed.append(held_out_turn_residuals(fitted, one.turns))
     assert len(missed[0]) == sum(len(t.closure) + len(t.way) for t in one.turns)
     before, after = (np.sqrt(np.mean(m**2)) for m in missed)
@@ -323,11 +322,11 @@ def test_a_copied_column_is_as_the_one_it_is_near() -> None:
 
 
 def test_the_time_since_a_turn_counts_from_where_it_ends() -> None:
-    inference = ride("gyro_scale").inference
-    assert inference.turns is not None
-    turning, x = inference.turns.tracker, inference.dictionary.x
+    fit = ride("gyro_scale").fit
+    assert fit.turns is not None
+    turning, x = fit.turns.tracker, fit.dictionary.x
     first = int(np.argmax(x.position == 2))
-    ended = x.t[first] - inference.dictionary.since[:, first]
+    ended = x.t[first] - fit.dictionary.since[:, first]
     since = turning.time_since_turn(
         np.array([ended[0] - 0.5, ended[0], ended[0] + 2.0]), 2
     )
@@ -338,7 +337,7 @@ def test_the_time_since_a_turn_counts_from_where_it_ends() -> None:
 def test_a_gyroscope_that_is_off_on_the_way_bends_a_turn_as_its_bias_does() -> None:
     """Biases that wander from window to window are not those of the way either."""
     one = ride("gyro_scale")
-    d = one.inference.dictionary
+    d = one.fit.dictionary
     for turn in one.turns:
         whole = np.zeros((len(turn.closure), d.width))
         whole[:, turn.columns] = turn.design
@@ -356,11 +355,11 @@ def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
     prepared = prepare_recording(
         block, parse_description({"format": 1, "position": places})
     )
-    inference = build_inference(prepared.source, prepared.rows, prepared)
-    d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
-    linear = inference.system.linearised(inference.nominal)
-    assert inference.turns is not None and d.unoriented.all()
-    turns = inference.turns.linearised(inference.nominal, at_rest, linear, None)
+    fit = build_fit(prepared.source, prepared.rows, prepared)
+    d, at_rest = fit.dictionary, np.zeros(fit.dictionary.width)
+    linear = fit.system.linearised(fit.nominal)
+    assert fit.turns is not None and d.unoriented.all()
+    turns = fit.turns.linearised(fit.nominal, at_rest, linear, None)
     assert len(turns) > 3
     for turn in turns:
         whole = np.zeros((len(turn.closure), d.width))

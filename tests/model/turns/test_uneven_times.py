@@ -7,7 +7,7 @@ import pytest
 import strapdown
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import build_inference
+from fieldcal.diagnosis.explain import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.turns.attitude import accelerations
 from fieldcal.model.turns.rotation import small_turns
@@ -55,10 +55,10 @@ def test_a_turn_by_arrivals_does_not_contradict_its_positions() -> None:
          "position": strapdown.schedule()}
     )  # fmt: skip
     prepared = prepare_recording(Block.of(t, table[:, 1:4], table[:, 4:]), about)
-    inference = build_inference(prepared.source, prepared.rows, prepared)
-    assert inference.turns is not None
-    tracker = inference.turns.tracker
-    turns = list(tracker.turns(inference.nominal))
+    fit = build_fit(prepared.source, prepared.rows, prepared)
+    assert fit.turns is not None
+    tracker = fit.turns.tracker
+    turns = list(tracker.turns(fit.nominal))
     assert not tracker.contradicted_turns
     assert len(turns) == len(strapdown.ANGLES) - 1
     # 5 ms at the 0.6 rad/s of half a turn in 5 s, at both ends

@@ -1,9 +1,9 @@
 """Rows of windows of which only the means are known: one row for each window.
 
-A recording has several rows for each window (`model.reduce`). A table of means, and a
-procedure that is still running, have only the means and their covariances. If the time
-of any mean is not known, all count as taken at the same time, and no effect that
-depends on time can be found.
+A recording has several rows for each window (`model.rows.reduce`). A table of means,
+and a procedure that is still running, have only the means and their covariances. If
+the time of any mean is not known, all count as taken at the same time, and no effect
+that depends on time can be found.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.observations import Observations
 
 
-def rows_of_means(observations: Observations) -> RecordedRows:
-    """One row for each window; correlations between outputs are not kept."""
+def rows_of_observations(observations: Observations) -> RecordedRows:
+    """One row for each window; correlations between its six outputs are dropped."""
     n, nominal = len(observations), observations.nominal
     index = np.arange(n)
     time = observations.time
     if not np.isfinite(time).all():
         time = np.zeros(n)
     y = observations.mean.copy()
-    told = mean_variances(observations)
-    sd = np.sqrt(np.where(told > 0, told, np.nan))
+    variances = mean_variances(observations)
+    sd = np.sqrt(np.where(variances > 0, variances, np.nan))
     read = GyroReadings(
         observations.positions,
         index,
@@ -105,8 +105,8 @@ def with_window_variances(rows: Rows, known: Array) -> Rows:
     common = rows.window_error.copy()
     for p in np.unique(rows.x.position):
         at = rows.x.position == p
-        told = np.where(rows.used[at], 1 / rows.sd[at] ** 2, 0.0).sum(axis=0)
-        white = 1 / np.maximum(told, 1e-300)
+        information = np.where(rows.used[at], 1 / rows.sd[at] ** 2, 0.0).sum(axis=0)
+        white = 1 / np.maximum(information, 1e-300)
         beyond = np.maximum(np.nan_to_num(known[p]) - white, 0.0)
         common[at] = np.maximum(common[at], np.sqrt(beyond))
     return replace(rows, window_error=common)

@@ -1,0 +1,110 @@
+"""Gains of all groups of a dictionary in addition to a set, at several instabilities.
+
+All groups with the same number of columns are calculated together, and so are all
+instabilities, which is faster than one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from hashlib import blake2b
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
+from fieldcal.model.evidence.gram import WeightedGram, evidence_gains
+from fieldcal.model.evidence.sets import Sets
+from fieldcal.model.search.instabilities import InstabilityIndices
+from fieldcal.model.search.set_at_instability import SetAtInstability
+
+MIN_CACHED_COLUMNS = 30
+"""Number of columns of a group from which its gains are cached."""
+
+
+@dataclass(frozen=True, slots=True)
+class WeightedColumns:
+    """Products of all columns at one instability, for any set.
+
+    Attributes
+    ----------
+    rows : Gram matrix weighted with the instability
+    rhs : (k,) of all columns
+    blocks : Phi^T R^-1 Phi of the blocks of each width
+
+    """
+
+    rows: WeightedGram
+    rhs: Array
+    blocks: list[Array]
+
+
+class GroupGains:
+    """Calculates the gains of all groups, and caches what several sets need.
+
+    Parameters
+    ----------
+    sets : evaluates sets, and has the Gram matrix of the rows
+
+    """
+
+    def __init__(self, sets: Sets) -> None:
+        self._sets = sets
+        self._weighted: dict[InstabilityIndices, WeightedColumns] = {}
+        self._wide_gains: dict[bytes, Array] = {}
+
+    def by_width(
+        self, levels: Sequence[SetAtInstability]
+    ) -> Iterator[tuple[EqualWidthGroups, Array]]:
+        """Gain at each size of every group, (levels, groups, sizes), width by width."""
+        weighted = [self._weighted_columns(level.instability) for level in levels]
+        halves, rests = [], []
+        for columns, level in zip(weighted, levels, strict=True):
+            shared = columns.rows.matrix(level.state.columns, None)
+            halves.append(level.state.half @ shared)
+            rests.append(columns.rhs - shared.T @ level.state.estimate)
+        half, rest = np.stack(halves), np.stack(rests)
+        for w, alike in enumerate(self._sets.dictionary.groups_by_width):
+            own = np.stack([columns.blocks[w] for columns in weighted])
+            part = np.moveaxis(half[:, :, alike.blocks], 1, 2)  # (l, b, a, k)
+            typical, block = alike.typical, alike.block
+            inner = (own - np.swapaxes(part, 2, 3) @ part)[:, block]
+            inner *= typical[:, :, None] * typical[:, None, :]
+            top = (np.diagonal(own, 0, 2, 3)[:, block] * typical**2).max(axis=-1)
+            rhs = rest[:, alike.blocks[block]] * typical
+            yield alike, self.gains(inner, rhs, top)
+
+    def gains(self, inner: Array, rhs: Array, own: Array) -> Array:
+        """Gains of groups; those of wide groups are cached by their matrices.
+
+        A group that is not connected with a triad has the same gain at all of its
+        instabilities.
+        """
+        if inner.shape[-1] < MIN_CACHED_COLUMNS:
+            return evidence_gains(inner, rhs, own)
+        shape, k = rhs.shape[:-1], rhs.shape[-1]
+        inner, rhs, own = inner.reshape(-1, k, k), rhs.reshape(-1, k), own.ravel()
+        keys = [
+            _digest(*arrays) for arrays in zip(inner, rhs, own[:, None], strict=True)
+        ]
+        new = {key: i for i, key in enumerate(keys) if key not in self._wide_gains}
+        at = list(new.values())
+        gains = evidence_gains(inner[at], rhs[at], own[at])
+        self._wide_gains.update(zip(new, gains, strict=True))
+        return np.array([self._wide_gains[key] for key in keys]).reshape(*shape, -1)
+
+    def _weighted_columns(self, instability: InstabilityIndices) -> WeightedColumns:
+        """Products of all columns at one instability; cached."""
+        if instability not in self._weighted:
+            rows = self._sets.gram_at(instability)
+            by_width = self._sets.dictionary.groups_by_width
+            blocks = rows.diagonals([alike.blocks for alike in by_width])
+            columns = WeightedColumns(rows, rows.rhs(None), blocks)
+            self._weighted[instability] = columns
+        return self._weighted[instability]
+
+
+def _digest(*arrays: Array) -> bytes:
+    """Key of some arrays, by their values."""
+    return blake2b(b"".join(a.tobytes() for a in arrays), digest_size=16).digest()

@@ -177,6 +177,23 @@ def test_a_third_turn_is_about_the_y_that_both_have_turned(
     np.testing.assert_allclose(two, turned(a, b) @ vector, atol=1e-12)
 
 
+def test_angles_of_single_precision_are_turned_in_double() -> None:
+    single = np.array([0.3, -0.2, 1.1], dtype=np.float32)
+    double = single.astype(float)
+    np.testing.assert_allclose(
+        frames.direction_cosines(*single), frames.direction_cosines(*double), rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        frames.angles_of_force_direction(single),
+        frames.angles_of_force_direction(double), rtol=1e-14,
+    )  # fmt: skip
+    matrix = turned(0.3, -0.2).astype(np.float32)
+    np.testing.assert_allclose(
+        frames.angles_of_direction_cosines(matrix),
+        frames.angles_of_direction_cosines(matrix.astype(float)), rtol=1e-14,
+    )  # fmt: skip
+
+
 @given(st.floats(-1e4, 1e4), st.sampled_from([360.0, 2 * np.pi]))
 def test_a_wrapped_angle_is_the_same_direction_within_half_a_turn(
     one: float, turn: float

@@ -203,6 +203,14 @@ def test_a_column_in_its_place_is_what_the_parameter_does(name: str) -> None:
     assert at == start + channel
 
 
+@pytest.mark.parametrize(
+    "name", ["cross_coupling.k12", "angle_offset.beta0_deg", "gyr_bias.x"]
+)
+def test_a_parameter_that_is_not_in_the_set_has_no_column(name: str) -> None:
+    d = given(FIVE_POSITIONS, ParameterSetOptions("base_tilt"))
+    assert d.columns_for(name).tolist() == []
+
+
 def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
     free = given(FIVE_POSITIONS, ParameterSetOptions("base_tilt"))
     assert all(g.fixed_size == priors.FREE_SIZE for g in free.always)

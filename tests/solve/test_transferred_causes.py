@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from test_explanations import TIMES, member, seen
 
 from fieldcal.calibration.names import TILTS
 from fieldcal.model import priors
@@ -14,6 +16,8 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.physics.effect import Scatter, Sensor
 from fieldcal.solve import explanations
 from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
+from fieldcal.solve.rows import rows_of_means
 
 OFFSET, BASE = TILTS
 
@@ -104,6 +108,13 @@ def test_some_parameters_of_a_group_keep_their_columns_and_sizes() -> None:
     assert some.columns.tolist() == [12, 10] and some.typical.tolist() == [3.0, 1.0]
 
 
+def test_a_group_without_an_equation_has_no_variants() -> None:
+    nothing: Any = None
+    group: Any = SimpleNamespace(effect=None, cause="time")
+    with pytest.raises(TypeError, match="^time has no equation$"):
+        explanations._group_variants(nothing, group)
+
+
 @pytest.mark.parametrize("oriented", [True, False])
 def test_parameters_that_a_rotation_makes_of_others_are_those_others(
     oriented: bool,
@@ -119,3 +130,28 @@ def test_parameters_that_a_rotation_makes_of_others_are_those_others(
     assert found == ((1, 2, 0) if oriented else (0, 2))
     without: Any = SimpleNamespace(effect=None, params=(4,))
     assert explanations._in_axes_of(d, without) == (4,)
+
+
+def test_where_gyroscopes_were_measured_they_may_drift_with_the_accelerometers() -> (
+    None
+):
+    rows = rows_of_means(replace(seen(), mean=np.nan_to_num(seen().mean)))
+    x = replace(rows.rows.x, since_start=TIMES)
+    shown = [WeightedExplanation((member("bias_drift"),), 1.0)]
+    d = ParameterSet(
+        replace(rows.rows, x=x), np.ones(6), rows.since_turn, False,
+        ParameterSetOptions(), shown,
+    )  # fmt: skip
+    (one,) = d.explanations
+    ((cause, _),) = one.members
+    assert cause.key == "bias_drift:acc"
+    ((other, group),) = one.possible_members
+    assert other.key == "bias_drift:gyr" and group is other.variants[0]
+    axes = {(3,), (4,), (5,), (3, 4), (3, 5), (4, 5), (3, 4, 5)}
+    assert {g.params for g in other.variants} == axes and group.params == (3, 4, 5)
+    both = [member("bias_drift"), (other, group)]
+    again = ParameterSet(
+        replace(rows.rows, x=x), np.ones(6), rows.since_turn, False,
+        ParameterSetOptions(), [WeightedExplanation(tuple(both), 1.0)],
+    )  # fmt: skip
+    assert again.explanations[0].possible_members == (), "both are there already"

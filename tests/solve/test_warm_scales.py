@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -151,6 +153,14 @@ def test_a_course_without_physics_may_be_the_temperatures(part: str, axes: int) 
         own = columns[:, :, c * count : (c + 1) * count]
         np.testing.assert_allclose(own[:, c], expected[:, c])
         assert not np.delete(own, c, axis=1).any()
+
+
+def test_columns_that_follow_no_course_cannot_be_the_temperatures() -> None:
+    general = [(0, 2, None), (2, 4, "columns of another kind")]
+    table: Any = SimpleNamespace(basis_ranges=lambda: general, unit=np.ones(6))
+    group = Group("time", "acc", np.array([2]), np.ones(1))
+    with pytest.raises(TypeError, match="^time is no course of biases$"):
+        warm_scale(table, group)
 
 
 def test_other_functions_without_physics_change_no_scale_factor() -> None:

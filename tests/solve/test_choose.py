@@ -11,7 +11,6 @@ from observed import observe, outputs
 from test_estimation import estimate
 from test_result import observed
 
-from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import TWO_POSITIONS
 from fieldcal.solve import choose
 from fieldcal.solve.options import SolveOptions
@@ -173,58 +172,6 @@ def test_without_any_means_nothing_is_determined() -> None:
     empty = estimate([], np.zeros(0), np.zeros((0, 0)), acc=cast(Any, nothing))
     assert not choose._determines_all(empty)
     assert choose._determines_all(fitted(0.0, acc=nothing))
-
-
-COARSER = FactoryErrors(1e-2, 2e-4, 9e-5)
-STATED = FactoryErrors(1e-3, 2e-5, 9e-6)
-
-
-def by_grade(
-    monkeypatch: pytest.MonkeyPatch, chances: dict[str, float], **options: Any
-) -> tuple[Any, list[FactoryErrors]]:
-    """Fit with the sizes of the coarser grade, which are as likely as `chances`."""
-    asked: list[FactoryErrors] = []
-    coarse, fine = fitted(0.0, bias=1.0), fitted(0.0, bias=3.0)
-
-    class WithChances:
-        def coarser_probabilities(self, stated: FactoryErrors) -> dict[str, float]:
-            assert stated is STATED
-            return chances
-
-        names, values = coarse.names, coarse.values
-        covariance_of = coarse.covariance_of
-
-    first = WithChances()
-
-    def estimated(recorded: Any, turning: Any, nominal: Any, wanted: Any,
-                  averaged: bool) -> Any:  # fmt: skip
-        assert averaged and turning is None
-        asked.append(wanted.factory)
-        return first if len(asked) == 1 else fine
-
-    monkeypatch.setattr(choose, "estimate_parameters", estimated)
-    found = session(factory=COARSER, **options)._fit("none")
-    return ("coarse" if found is first else found), asked
-
-
-def test_errors_that_are_as_small_as_stated_have_their_stated_size(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Both kinds are as stated with a probability of 0.9 times 0.6."""
-    chances = {"cross_coupling": 0.1, "quadratic": 0.5, "g_sensitivity": 0.4}
-    found, asked = by_grade(monkeypatch, chances, at_best=STATED)
-    assert asked == [COARSER, FactoryErrors(1e-3, 2e-4, 9e-6)]
-    assert found.values[0] == 3.0
-    assert found.covariance[0, 0] == pytest.approx(1 + (1 - 0.9 * 0.6) * 2.0**2)
-
-
-def test_errors_that_are_coarser_keep_the_size_of_the_coarser_grade(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    found, asked = by_grade(monkeypatch, {"quadratic": 0.5}, at_best=STATED)
-    assert found == "coarse" and asked == [COARSER]
-    found, asked = by_grade(monkeypatch, {"quadratic": 0.1})
-    assert found == "coarse" and asked == [COARSER], "no other grade is stated"
 
 
 def over_rates(

@@ -267,6 +267,7 @@ def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
     basis = next(b for first, b in d.bases if first <= one.columns[0] < first + 3)
     view = RowView.of(rows.x, recorded.since_turn, nominal(len(FIVE_POSITIONS)))
     table = basis.evaluate(view)
+    assert table.shape == (5, 6, 3), "of every output by each accelerometer"
     np.testing.assert_allclose(np.abs(table[:, 0, 0]), np.abs(d.sign[:5, 0]))
     np.testing.assert_allclose(table[:, 0, 0], -d.sign[:5, 0])
     assert np.count_nonzero(table[:, 1:, 0]) == 0

@@ -89,13 +89,14 @@ def test_a_force_of_unknown_direction_is_along_the_measured_one() -> None:
 
 def test_unseen_earth_is_an_error_of_windows_that_share_a_bias() -> None:
     """Its mean square about each axis, over all directions, is a third of its own."""
-    error = unknown_earth_rate((1.0, -2.0, 0.5))
-    assert error @ error == pytest.approx(EARTH**2 * (1 + 4 + 0.25) / 3)
-    assert (error > 0).all()
+    every = np.random.default_rng(7).standard_normal((100_000, 3))
+    every *= EARTH / np.linalg.norm(every, axis=1, keepdims=True)
+    error = unknown_earth_rate((1.0, -2.0, 4.0))
+    sizes = np.array([1.0, 2.0, 4.0])
+    np.testing.assert_allclose(error, (sizes * every).std(axis=0), rtol=0.01)
     two = rows_of_means(seen((HAND, HAND), nominal=NOMINAL))
-    np.testing.assert_allclose(
-        two.rows.window_error[:, 3:], [unknown_earth_rate((1.0, 2.0, 1.0))] * 2
-    )
+    expected = EARTH / np.sqrt(3) * np.array([1.0, 2.0, 1.0])
+    np.testing.assert_allclose(two.rows.window_error[:, 3:], np.tile(expected, (2, 1)))
     assert not two.rows.window_error[:, :3].any()
     assert not rows_of_means(seen((HAND,))).rows.window_error.any()
 

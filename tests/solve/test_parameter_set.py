@@ -262,6 +262,7 @@ def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
     )
     (one,) = (g for _, g in d.base_members if g.cause == "rounding")
     assert one.typical.tolist() == [0.01, 0.02] and one.fixed_size == 1.0
+    assert one.part == "acc", "gyroscopes are not cut"
     np.testing.assert_allclose(d.sign[:5, 0], [1.0, -1.0, 0.5, -1.0, 0.0])
     assert not d.sign[:, 1].any() and not d.sign[-1].any(), "none on the way"
     basis = next(b for first, b in d.bases if first <= one.columns[0] < first + 3)

@@ -190,6 +190,17 @@ def test_means_have_no_turns() -> None:
     assert rows.turn_integrator() is None
 
 
+@pytest.mark.parametrize("legs", [(), ("from one position to the next",)])
+def test_a_recording_without_a_turn_has_nothing_to_integrate(
+    monkeypatch: pytest.MonkeyPatch, legs: tuple[str, ...]
+) -> None:
+    tracker = SimpleNamespace(legs=legs)
+    monkeypatch.setattr(estimation, "TurnTracker", lambda *told: tracker)
+    means = rows_of_means(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
+    recorded = replace(means, source=cast(Any, "samples"))
+    assert recorded.turn_integrator() is (cast(Any, tracker) if legs else None)
+
+
 def test_what_is_known_before_of_lot_and_filters() -> None:
     recorded = rows_of_means(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
     nominal, nothing = cast(Any, None), SimpleNamespace(lot=None)

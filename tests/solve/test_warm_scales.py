@@ -88,7 +88,9 @@ def test_columns_are_the_course_times_the_force_and_as_large_as_the_biases() -> 
     _, group = drift(d)
     found = warm_scale(d, group)
     assert found is not None
-    _, one = found
+    cause, one = found
+    assert one.effect is group.effect and one.shape == group.shape
+    assert one.params == (0, 1, 2) and not cause.reportable
     first, end, basis = list(d.basis_ranges())[-1]
     assert one.columns.tolist() == list(range(first, end))
     columns = basis.evaluate(RowView.of(d.x, d.since, NOMINAL))

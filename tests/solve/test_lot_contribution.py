@@ -143,7 +143,7 @@ def test_an_odd_unit_is_told_with_what_to_do() -> None:
         " 0.020 m/s², where the lot has 0.050 ± 0.010; nothing of the lot is in the"
         " result: see whether it is the right lot, and examine the unit"
     )
-    # of all parameters together the one that is furthest off: 1.34 and 1.34 sigmas
+    # without a single one, that which is furthest off: the bias by 2.2 sigmas, not 1.3
     further = {"acc_bias.x": (0.0, 0.02), "acc_scale.x": (1.004, 1e-3)}
     assert "acc_bias.x is 0.000 ± 0.020 m/s²" in told(0.97, own=further).sentence
     unknown = told(0.97, own={}).sentence

@@ -3,11 +3,18 @@
 import doctest
 import errno
 import re
+from pathlib import Path
 
 import pytest
 
 from fieldcal.core import errors
-from fieldcal.core.errors import FieldcalError, LinkLost, Moved, disk_says
+from fieldcal.core.errors import (
+    FieldcalError,
+    LinkLost,
+    Moved,
+    RecordingEnded,
+    disk_says,
+)
 
 
 def test_every_error_ends_with_the_code_that_is_documented() -> None:
@@ -25,12 +32,19 @@ def test_every_error_ends_with_the_code_that_is_documented() -> None:
 def test_a_disturbance_carries_its_text_instant_and_axis() -> None:
     moved = Moved("disturbed on ax", 12.5, "ax")
     assert (str(moved), moved.at, moved.axis) == ("disturbed on ax", 12.5, "ax")
+    assert moved.seconds == 0.0
+    assert Moved("disturbed on ax", 12.5, "ax", 0.25).seconds == 0.25
 
 
 def test_a_lost_link_carries_what_to_check_apart_from_what_to_do_next() -> None:
     lost = LinkLost("the port is gone: plug it in")
     assert lost.fault == "the port is gone: plug it in"
     assert str(lost) == "the port is gone: plug it in, then start again"
+
+
+def test_a_recording_that_is_played_ends_by_its_name_and_length() -> None:
+    ended = RecordingEnded(Path("march/log.csv"), 12.34567)
+    assert str(ended) == "march/log.csv has ended after 12.346 s"
 
 
 @pytest.mark.parametrize(

@@ -163,6 +163,63 @@ def test_a_mounting_that_is_no_right_handed_frame_is_refused(axes: list[str]) ->
     assert "name each axis once, and check the signs against" in str(told.value)
 
 
+@given(angle, angle, angle)
+def test_a_third_turn_is_about_the_y_that_both_have_turned(
+    a: float, b: float, c: float
+) -> None:
+    third = Rotation.from_euler("y", -c).as_matrix()
+    expected = third @ turned(a, b)
+    np.testing.assert_allclose(frames.direction_cosines(a, b, c), expected, atol=1e-12)
+    vector = np.array([0.3, -9.7, 1.1])
+    found = frames.in_procedure_axes(np.array(a), np.array(b), vector, c)
+    np.testing.assert_allclose(found, expected @ vector, atol=1e-12)
+    two = frames.in_procedure_axes(np.array(a), np.array(b), vector)
+    np.testing.assert_allclose(two, turned(a, b) @ vector, atol=1e-12)
+
+
+def test_angles_of_single_precision_are_turned_in_double() -> None:
+    single = np.array([0.3, -0.2, 1.1], dtype=np.float32)
+    double = single.astype(float)
+    np.testing.assert_allclose(
+        frames.direction_cosines(*single), frames.direction_cosines(*double), rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        frames.angles_of_force_direction(single),
+        frames.angles_of_force_direction(double), rtol=1e-14,
+    )  # fmt: skip
+    matrix = turned(0.3, -0.2).astype(np.float32)
+    np.testing.assert_allclose(
+        frames.angles_of_direction_cosines(matrix),
+        frames.angles_of_direction_cosines(matrix.astype(float)), rtol=1e-14,
+    )  # fmt: skip
+
+
+@given(st.floats(-1e4, 1e4), st.sampled_from([360.0, 2 * np.pi]))
+def test_a_wrapped_angle_is_the_same_direction_within_half_a_turn(
+    one: float, turn: float
+) -> None:
+    wrapped = frames.wrap_angle(np.array([one]), turn)[0]
+    assert -turn / 2 <= wrapped <= turn / 2
+    turns = (one - wrapped) / turn
+    assert turns == pytest.approx(round(turns), abs=1e-9)
+
+
+def test_angles_are_wrapped_in_rad_unless_a_turn_is_given() -> None:
+    found = frames.wrap_angle(np.array([4.0, -4.0, 1.0]))
+    np.testing.assert_allclose(found, [4 - 2 * np.pi, 2 * np.pi - 4, 1.0])
+
+
+def test_the_shortest_rotation_leads_from_one_attitude_to_the_other() -> None:
+    """In axes of the device, which turn with it."""
+    before = frames.direction_cosines(0.4, -0.3)
+    alpha, beta = np.array([0.4, 1.9, -2.8]), np.array([-0.3, 0.2, 1.1])
+    found = frames.shortest_rotation(before, alpha, beta)
+    for vector, a, b in zip(found, alpha, beta, strict=True):
+        after = Rotation.from_rotvec(-vector).as_matrix() @ before
+        np.testing.assert_allclose(after, turned(a, b), atol=1e-12)
+        assert np.linalg.norm(vector) <= np.pi
+
+
 def test_examples() -> None:
     failed, tried = doctest.testmod(frames, extraglobs={"np": np})
     assert tried and not failed

@@ -13,9 +13,12 @@ from fieldcal.core.positions import (
     WIDE_POSITIONS,
     Position,
     alpha_beta_angles,
+    attitude_sigmas,
+    gamma_angles,
     ladder_settings,
     specific_forces,
     table_rates,
+    unknown_axis_speeds,
 )
 
 UNKNOWN = Position("as it lies")
@@ -44,6 +47,68 @@ def test_a_position_is_oriented_by_both_angles(position: Position) -> None:
     assert Position("level", 0.0, 0.0).degrees == (0.0, 0.0)
 
 
+def test_a_third_angle_is_part_of_name_and_of_all_degrees() -> None:
+    position = Position.deg(30, -5, gamma=12.5)
+    assert position.name == "α = 30°, β = -5°, γ = 12.5°"
+    assert position.gamma == pytest.approx(np.deg2rad(12.5))
+    assert position.all_degrees == (30.0, -5.0, 12.5) and position.oriented
+    # two angles do not tell how it lies
+    assert position.degrees is None
+    assert Position.deg(30, -5).all_degrees == (30.0, -5.0, 0.0)
+    assert UNKNOWN.all_degrees is Position("a", beta=0.0).all_degrees is None
+    assert Position("b", alpha=0.0).all_degrees is None
+
+
+def test_all_degrees_of_a_tenth_come_back_and_no_zero_is_negative() -> None:
+    for gamma in np.arange(-180, 180, 0.7).round(1):
+        found = Position.deg(-0.0, gamma / 2, gamma=gamma).all_degrees
+        assert found == (0.0, round(gamma / 2, 9), gamma)
+        assert np.copysign(1.0, found[0]) == 1.0
+
+
+def test_scaled_angles_are_all_multiplied_and_the_rest_is_kept() -> None:
+    rate = (0.0, 0.5, 0.0)
+    position = Position("on the table", 0.2, -0.1, rate, 0.3, 0.01, 2.0, 0.4)
+    assert position.scaled(2.0) == Position(
+        "on the table", 0.4, -0.2, rate, 0.6, 0.01, 2.0, 0.4
+    )
+    for unknown in (UNKNOWN, Position("a", alpha=0.3), Position("b", beta=0.3)):
+        assert unknown.scaled(2.0) == unknown
+
+
+@pytest.mark.parametrize(
+    ("position", "turns"),
+    [
+        (UNKNOWN, False),
+        (Position("still", rate=(0.0, 0.0, 0.0)), False),
+        (Position("about z", rate=(0.0, 0.0, -0.5)), True),
+        (Position("about an unknown axis", speed=0.5), True),
+        (Position("about an unknown axis", speed=0.5, rate=(0.0, 0.0, 0.0)), True),
+    ],
+)
+def test_a_table_turns_what_has_a_rate_or_a_speed(
+    position: Position, turns: bool
+) -> None:
+    assert position.on_turning_table is turns
+
+
+def test_speeds_about_an_unknown_axis_and_their_sigmas() -> None:
+    seen = [Position("fast", speed=2.0, speed_sigma=0.01), UNKNOWN]
+    speed, sigma = unknown_axis_speeds(seen)
+    np.testing.assert_array_equal(speed, [2.0, 0.0])
+    np.testing.assert_array_equal(sigma, [0.01, 0.0])
+    whole = unknown_axis_speeds([Position("whole numbers", speed=2, speed_sigma=1)])
+    assert [x.dtype for x in whole] == [float, float]
+
+
+def test_sigmas_and_third_angles_of_positions() -> None:
+    seen = [Position("held by hand", gamma=0.2, sigma=0.05), UNKNOWN]
+    np.testing.assert_array_equal(attitude_sigmas(seen), [0.05, np.nan])
+    np.testing.assert_array_equal(gamma_angles(seen), [0.2, 0.0])
+    np.testing.assert_array_equal(attitude_sigmas([UNKNOWN]), [np.nan])
+    assert gamma_angles([Position("whole numbers", gamma=1)]).dtype == float
+
+
 def test_angles_and_rates_that_are_not_known() -> None:
     table = Position("turning", 0.1, 0.2, (0.0, 0.5, 0.0))
     alpha, beta = alpha_beta_angles([table, UNKNOWN])
@@ -57,6 +122,8 @@ def test_angles_and_rates_that_are_not_known() -> None:
 def test_no_position_has_no_angles_and_no_rates() -> None:
     assert alpha_beta_angles([])[0].shape == alpha_beta_angles([])[1].shape == (0,)
     assert table_rates([]).shape == specific_forces([], 9.81).shape == (0, 3)
+    assert [x.shape for x in unknown_axis_speeds([])] == [(0,), (0,)]
+    assert attitude_sigmas([]).shape == gamma_angles([]).shape == (0,)
 
 
 def test_forces_are_gravity_seen_from_the_turned_device() -> None:

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import doctest
+from math import exp
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.special import gammaincc
 from scipy.stats import norm
 
-from fieldcal.core.probability import MAD_TO_SIGMA, chi2_tail
+from fieldcal.core import probability
+from fieldcal.core.probability import (
+    MAD_TO_SIGMA,
+    chi2_tail,
+    probability_of_log_odds,
+)
 
 
 @pytest.mark.parametrize("dof", [1, 2, 3, 4, 5, 10, 33, 100, 1001, 20000])
@@ -24,3 +34,22 @@ def test_what_has_no_end_has_no_chance() -> None:
 
 def test_a_median_of_deviations_is_that_of_a_normal_spread() -> None:
     assert MAD_TO_SIGMA == pytest.approx(1 / norm.ppf(0.75), rel=1e-4)
+
+
+@given(st.floats(1e-12, 1 - 1e-12))
+def test_odds_of_a_probability_have_that_probability(p: float) -> None:
+    log_odds = np.log(p) - np.log1p(-p)
+    assert probability_of_log_odds(log_odds) == pytest.approx(p, rel=1e-9)
+
+
+def test_tiny_probabilities_are_the_odds_and_all_shapes_are_kept() -> None:
+    found = probability_of_log_odds([[-700, -40], [0, 800]])
+    np.testing.assert_allclose(
+        found, [[exp(-700), exp(-40)], [0.5, 1.0]], rtol=1e-12, atol=0
+    )
+    assert probability_of_log_odds([1, 2]).dtype == float
+
+
+def test_examples() -> None:
+    failed, tried = doctest.testmod(probability)
+    assert tried and not failed

@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core import samples
-from fieldcal.core.samples import Block, Grain, common_unit, concat, split_by_time
+from fieldcal.core.samples import (
+    Block,
+    Grain,
+    common_unit,
+    concat,
+    impossible_rate_text,
+    runs_of_true,
+    split_by_time,
+)
 
 
 def whole(n: int, start: float = 0.0) -> Block:
@@ -104,6 +112,33 @@ def test_pieces_begin_at_their_edge() -> None:
 )
 def test_the_unit_that_channels_share(names: list[str], unit: str | None) -> None:
     assert common_unit(names) == unit
+
+
+@pytest.mark.parametrize("rate", [0.01, 200.0, 32_000.0, 1e6, np.nan])
+def test_a_rate_that_a_device_may_have_needs_no_text(rate: float) -> None:
+    assert impossible_rate_text(rate) == ""
+
+
+def test_a_rate_that_no_device_has_is_told_with_the_option_to_correct_it() -> None:
+    assert impossible_rate_text(2.345e8) == (
+        "its samples come 2.3e+08 times a second, which no IMU does: the times are in"
+        " another unit than s; import the recording again with --time-unit"
+    )
+    assert impossible_rate_text(np.inf).startswith("its samples come inf times")
+    assert impossible_rate_text(np.nextafter(1e6, 2e6))
+
+
+@given(st.lists(st.booleans()))
+def test_runs_are_those_of_a_walk_along_the_flags(flags: list[bool]) -> None:
+    expected: list[list[int]] = []
+    for i, (flag, before) in enumerate(
+        zip(flags, [False, *flags][: len(flags)], strict=True)
+    ):
+        if flag and not before:
+            expected.append([i, i + 1])
+        elif flag:
+            expected[-1][1] = i + 1
+    assert runs_of_true(np.array(flags, dtype=bool)).tolist() == expected
 
 
 def test_examples() -> None:

@@ -33,6 +33,12 @@ def test_every_so_many_steps_are_enough_for_the_rate(
     )
 
 
+def test_every_step_of_a_short_recording_counts_for_the_rate() -> None:
+    """Of 20 steps of 0.1 s and 20 of 0.3 s in turn the median is between them."""
+    t = np.concatenate([[0.0], np.cumsum(np.tile([0.1, 0.3], 20))])
+    assert sampling_rate(Block.of(t, np.zeros((41, 3)))) == pytest.approx(5.0)
+
+
 @pytest.mark.parametrize("rate", [1.0, 50.0, 1000.0])
 def test_a_pause_counts_wherever_it_touches_the_samples(rate: float) -> None:
     t = np.arange(40) / rate

@@ -13,6 +13,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.state import State
 from fieldcal.solve import agreement, solve
+from fieldcal.solve.agreement import LargestResidual, TriadFit
 from fieldcal.solve.base_rate import with_base_rate
 from fieldcal.solve.estimation import ParameterEstimate, estimate_parameters
 from fieldcal.solve.observation_rows import rows_of_observations
@@ -248,3 +249,25 @@ def test_a_length_of_which_an_axis_is_clipped_is_no_length() -> None:
     assert np.isnan(one.acc.residuals[clipped]).all()
     assert np.isfinite(np.delete(one.acc.residuals[:, 0], clipped)).all()
     assert one.acc.dof == n - 1 - 6
+
+
+@pytest.mark.parametrize(
+    ("chi2", "dof", "rejects"),
+    [(53.9, 6, False), (54.0, 6, True), (90.0, 0, False), (np.nan, 6, True)],
+)
+def test_noise_never_makes_nine_times_its_own_variance(
+    chi2: float, dof: int, rejects: bool
+) -> None:
+    fit = TriadFit(chi2, dof, 0.0, 0.0, np.zeros((1, 3)))
+    assert fit.rejects_model is rejects
+
+
+def test_the_largest_residual_is_the_one_of_most_sigmas() -> None:
+    off = np.array([[3.0, np.nan, 1.0], [-4.0, np.nan, np.nan]])
+    sigma = np.array([[1.0, 1.0, 0.25], [0.5, np.nan, np.nan]])
+    lengths = np.array([False, True])
+    assert LargestResidual.of(off, sigma, lengths) == LargestResidual(1, -1, -4.0, 0.5)
+    assert LargestResidual.of(off[:1], sigma[:1], lengths[:1]) == LargestResidual(
+        0, 2, 1.0, 0.25
+    )
+    assert LargestResidual.of(off * np.nan, sigma, lengths) is None

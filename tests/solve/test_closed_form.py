@@ -171,8 +171,15 @@ def test_a_turn_that_loads_z_alike_leaves_z_out_and_says_what_would_help(
 def test_positions_that_hold_no_scale_factor_are_refused(
     places: tuple[Position, ...],
 ) -> None:
-    with pytest.raises(NotObservable):
+    with pytest.raises(NotObservable) as told:
         two_position(observe(places, outputs(places)))
+    alike = (
+        f"{places[0].name} and {places[-1].name} give every accelerometer the same"
+        " specific force, so they hold no scale factor: turn the second position, to"
+        " α = 45°, β = 5° for instance"
+    )
+    few = "two positions with known angles are needed, not 1"
+    assert str(told.value) == (alike if len(places) == 2 else few)
 
 
 @pytest.mark.parametrize("g", [0.0, -9.81, float("nan")])
@@ -262,8 +269,12 @@ def test_axes_that_few_positions_leave_open_are_left_out() -> None:
     places = tuple(Position.deg(a, 0) for a in (0, 20, 45))
     found = five_position(observe(places, outputs(places, offset_deg=(1, 0))))
     assert found.names == ("acc_bias.x", "acc_scale.x", "angle_offset.alpha0_deg")
-    with pytest.raises(NotObservable, match="three different"):
+    with pytest.raises(NotObservable) as told:
         five_position(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
+    assert str(told.value) == (
+        "2 positions separate bias, scale factor and tilt on no axis: take at least"
+        " three different α, or assume a level base"
+    )
 
 
 def earth(a: float, b: float) -> Array:

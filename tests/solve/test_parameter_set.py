@@ -203,6 +203,14 @@ def test_a_column_in_its_place_is_what_the_parameter_does(name: str) -> None:
     assert at == start + channel
 
 
+@pytest.mark.parametrize(
+    "name", ["cross_coupling.k12", "angle_offset.beta0_deg", "gyr_bias.x"]
+)
+def test_a_parameter_that_is_not_in_the_set_has_no_column(name: str) -> None:
+    d = given(FIVE_POSITIONS, ParameterSetOptions("base_tilt"))
+    assert d.columns_for(name).tolist() == []
+
+
 def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
     free = given(FIVE_POSITIONS, ParameterSetOptions("base_tilt"))
     assert all(g.fixed_size == priors.FREE_SIZE for g in free.always)
@@ -254,11 +262,13 @@ def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
     )
     (one,) = (g for _, g in d.base_members if g.cause == "rounding")
     assert one.typical.tolist() == [0.01, 0.02] and one.fixed_size == 1.0
+    assert one.part == "acc", "gyroscopes are not cut"
     np.testing.assert_allclose(d.sign[:5, 0], [1.0, -1.0, 0.5, -1.0, 0.0])
     assert not d.sign[:, 1].any() and not d.sign[-1].any(), "none on the way"
     basis = next(b for first, b in d.bases if first <= one.columns[0] < first + 3)
     view = RowView.of(rows.x, recorded.since_turn, nominal(len(FIVE_POSITIONS)))
     table = basis.evaluate(view)
+    assert table.shape == (5, 6, 3), "of every output by each accelerometer"
     np.testing.assert_allclose(np.abs(table[:, 0, 0]), np.abs(d.sign[:5, 0]))
     np.testing.assert_allclose(table[:, 0, 0], -d.sign[:5, 0])
     assert np.count_nonzero(table[:, 1:, 0]) == 0

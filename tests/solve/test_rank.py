@@ -78,6 +78,21 @@ def test_nothing_is_proposed_where_nothing_is_missing_or_nothing_helps() -> None
     assert positions_to_add(rows, TWO_POSITIONS, PROPOSED_POSITIONS) == []
 
 
+@pytest.mark.parametrize("missing", [MAX_POSITIONS, MAX_POSITIONS + 1])
+def test_no_more_than_four_positions_are_proposed(missing: int) -> None:
+    """Each position determines one parameter, that of its own number."""
+    numbered = [Position(str(n)) for n in range(8)]
+
+    def rows(places: Sequence[Position]) -> Array:
+        table = np.zeros((len(places), 1, missing))
+        for i, place in enumerate(places):
+            table[i, 0, int(place.name)] = 1.0
+        return table
+
+    found = positions_to_add(rows, (), numbered[:missing])
+    assert [p.name for p in found] == (["0", "1", "2", "3"] if missing == 4 else [])
+
+
 def test_the_proposed_positions_mend_what_solve_leaves_open() -> None:
     places = (Position.deg(0, 0), Position.deg(45, 0), Position.deg(20, 0))
     seen = observe(places, outputs(places))

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from observed import GYR_BIAS, observe, outputs
 
-from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.core.errors import NotObservable
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
-from fieldcal.solve import observations, result, solve
+from fieldcal.solve import result, solve
 from fieldcal.solve.estimation import ParameterEstimate
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.options import SolveOptions
@@ -166,78 +166,115 @@ def test_a_window_that_is_off_for_certain_has_no_weight_and_is_named() -> None:
     np.testing.assert_allclose(found.values, left.values, atol=0.3 * left.sigma.max())
 
 
-# --- what estimators are given
+def whole(**known: Any) -> ParameterEstimate:
+    """An estimate of two parameters in which nothing is odd."""
+    nothing: dict[str, Any] = {
+        "names": ("acc_bias.x", "gyr_bias.y"), "values": np.array([0.1, 0.01]),
+        "covariance": np.diag([1e-6, 1e-10]), "causes": {}, "turn_rows": (),
+        "bad_probability": np.array([0.0, 0.01234, 0.5, 0.0, 0.0]),
+        "any_cause_probability": 0.0, "shift_sigmas": np.zeros(2), "wrong_angles": (),
+        "contradicted_turns": (), "search": None,
+        "acc": fit(rejects_model=False), "gyr": fit(chi2=5.0, rejects_model=False),
+    }  # fmt: skip
+    found = estimated(**(nothing | known))
+    found.parameter_set.omitted_cross_coupling = None
+    cast(Any, found.parameter_set).earth = -1
+    return found
 
 
-def test_correlations_that_a_window_is_too_short_to_know_are_dropped() -> None:
-    size = np.array([1.0, 2.0, 3.0, 1e-3, 2e-3, 3e-3])
-    alike = np.full((6, 6), 0.5) + 0.5 * np.eye(6)
-    kept = alike * np.outer(size, size)
-    np.testing.assert_array_equal(observations._regularised(kept), kept)
-    one = alike.copy()
-    one[0, 1] = one[1, 0] = 1.0
-    one[0, 2] = one[1, 2] = one[2, 0] = one[2, 1] = 0.5
-    singular = one * np.outer(size, size)
-    found = observations._regularised(singular)
-    np.testing.assert_allclose(found[:3, :3], np.diag(size[:3] ** 2))
-    np.testing.assert_array_equal(found[3:, 3:], singular[3:, 3:])
-    assert not found[:3, 3:].any() and not found[3:, :3].any()
-    nowhere = kept.copy()
-    nowhere[3:, :] = nowhere[:, 3:] = np.nan
-    np.testing.assert_array_equal(observations._regularised(nowhere), nowhere)
-    still = kept.copy()
-    still[1, :] = still[:, 1] = 0.0
-    np.testing.assert_array_equal(observations._regularised(still), still)
+def test_the_object_of_the_result_has_every_number_in_its_place() -> None:
+    wanted: Any = SimpleNamespace(
+        turned=True, gyr_scale=True, level_deg=0.3, cross=False, tilt="base_tilt",
+        beside_tilt_deg=0.7, factory=FactoryErrors(1e-4, 2e-5, 3e-6, 4e-3, 5e-5, 6e-4),
+    )  # fmt: skip
+    harmful = WrongAngles(0, None, 1, 0.5, {"acc_bias.x": 1.0, "gyr_bias.y": 0.0})
+    harmless = WrongAngles(1, None, 1, 0.5, {"acc_bias.x": 0.0, "gyr_bias.y": 0.0})
+    found = whole(
+        wrong_angles=(harmless, harmful), closure_squares=(9.0, 6), turn_rows=("one",),
+        acc=fit(held_out_rms=2e-3), causes={"hum": 0.7}, score=-12.5,
+    )  # fmt: skip
+    cast(Any, found.parameter_set).options = wanted
+    seen = observed(latitude=0.5, temperature=np.arange(5.0), grade="navigation")
+    told = result._info("joint", seen, SolveOptions(angles_deg=0.05), found)
+    assert told == {
+        "conditions": {
+            "positions": 5, "gravity": 9.81,
+            "latitude_deg": pytest.approx(28.6478898), "temperature_degc": 2.0,
+            "temperature_sd_k": pytest.approx(2**0.5), "grade": "navigation",
+        },
+        "bad_position": [0.0, 0.0123, 0.5, 0.0, 0.0],
+        "extra_scatter": pytest.approx((25 / 3) ** 0.5), "log_evidence": -12.5,
+        "angle_sigma_deg": 0.05, "square_sigma": 1e-4, "quadratic_sigma": 2e-5,
+        "g_sensitivity_sigma": 3e-6, "acc_bias_per_k_sigma": 4e-3,
+        "gyr_bias_per_k_sigma": 5e-5, "acc_hysteresis_sigma": 6e-4,
+        "doubtful_position": {"name": FIVE_POSITIONS[2].name, "probability": 0.5},
+        "left_out_rms": 2e-3, "level_sigma_deg": 0.3, "beside_tilt_sigma_deg": 0.7,
+        "gyroscopes": {
+            "chi2": 5.0, "dof": 6, "unit": "rad/s", "rms": 1e-3,
+            "extra_scatter": pytest.approx((5 / 3) ** 0.5),
+        },
+        "wrong_angles": [harmful.to_json()],
+        "carried": {
+            "causes": {"hum": 0.7},
+            "moved_sigmas": {"acc_bias.x": 0.0, "gyr_bias.y": 0.0},
+        },
+        "turns": {"chi2": 9.0, "dof": 6, "scatter_rad": 5.0},
+    }  # fmt: skip
+    wanted.cross, wanted.tilt = True, "none"
+    more = result._info("joint", seen, SolveOptions(), found)
+    assert more["square_sigma"] == 0.0 and "beside_tilt_sigma_deg" not in more
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"gravity": 0.0}, "gravity is 0 m/s^2: give the local value, about 9.8, or the"
-         " latitude and height of the site"),
-        ({"mean": np.zeros((5, 5))}, "mean is (5, 5) where 5 positions need (5, 6)"),
-        ({"time": np.zeros(4)}, "time is (4,) where 5 positions need (5,)"),
-        ({"covariance": np.zeros((5, 6, 6))}, "the accelerometers' means have no"
-         " uncertainty above 0 m/s^2: a window of repeated equal values tells nothing"
-         " about its noise"),
-    ],
-)  # fmt: skip
-def test_observations_that_cannot_be_are_refused(
-    change: dict[str, Any], says: str
-) -> None:
-    seen = observed()
-    known: dict[str, Any] = {"positions": seen.positions, "mean": seen.mean,
-                             "covariance": seen.covariance, "gravity": 9.8}  # fmt: skip
-    with pytest.raises(InputError) as error:
-        Observations(**(known | change))
-    assert str(error.value) == says
-
-
-def test_a_mean_that_is_missing_is_named() -> None:
-    seen = observed()
-    mean = seen.mean.copy()
-    mean[3, 4] = np.nan
-    with pytest.raises(InputError) as error:
-        Observations(seen.positions, mean, seen.covariance, 9.8)
-    assert str(error.value) == (
-        f"position 4 ({FIVE_POSITIONS[3].name}) has no mean of gy: take its window"
-        " again or leave it out"
+def test_what_is_not_there_has_no_key() -> None:
+    found = whole(bad_probability=np.zeros(5))
+    cast(Any, found.parameter_set.options).beside_tilt_deg = 0.0
+    told = result._info("joint", observed(gyr=False), SolveOptions(), found)
+    assert not {
+        "doubtful_position",
+        "left_out_rms",
+        "level_sigma_deg",
+        "gyroscopes",
+        "beside_tilt_sigma_deg",
+        "wrong_angles",
+        "carried",
+        "turns",
+    } & set(told)
+    assert "carried" in result._info(
+        "joint", observed(), SolveOptions(), whole(valid_at_s=30.0)
     )
-    with pytest.raises(InputError, match="there is no position with a window: take at"):
-        Observations.of((), (), 9.8)
-    with pytest.raises(InputError, match="the latitude is not known, so the Earth's"):
-        _ = seen.known_latitude
-    assert observed(latitude=0.7).known_latitude == 0.7
 
 
-def test_of_some_positions_everything_is_theirs() -> None:
-    seen = observed(temperature=np.arange(5.0), time=10 * np.arange(5.0))
-    some = seen[[3, 1]]
-    assert [p.name for p in some.positions] == [
-        FIVE_POSITIONS[3].name,
-        FIVE_POSITIONS[1].name,
-    ]
-    np.testing.assert_array_equal(some.mean, seen.mean[[3, 1]])
-    np.testing.assert_array_equal(some.temperature, [3.0, 1.0])
-    np.testing.assert_array_equal(some.time, [30.0, 10.0])
-    assert len(some.covariance) == 2 and len(some) == 2
+def test_a_calibration_begins_with_what_makes_it_bad(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(result, "largest_cross_coupling_effect", lambda one: None)
+    monkeypatch.setattr(result, "agreement_warnings", lambda *told: ["", "scatter"])
+    note = ["a note", "a note", ""]
+    good = result.build_calibration("joint", observed(), SolveOptions(), whole(), note)
+    assert good.good and good.warnings == ("a note", "scatter")
+    assert good.names == ("acc_bias.x", "gyr_bias.y")
+    assert good.units == ("m/s^2", "rad/s") and good.method == "joint"
+    assert (good.chi2, good.dof, good.rms) == (3.0, 6, 1e-3)
+    assert "borrowed" not in good.info
+    wrong = SimpleNamespace(latitude_wrong=True, sentence="latitude")
+    monkeypatch.setattr(
+        result, "VerticalEarthRate", SimpleNamespace(of=lambda *told: wrong)
+    )
+    found = whole(values=np.array([60.0, 0.01]), contradicted_turns=((0, 2),))
+    lot: Any = SimpleNamespace(sentence="a lot", to_json=lambda: {"lot": 7})
+    bad = result.build_calibration("joint", observed(), SolveOptions(), found, [], lot)
+    assert not bad.good and bad.info["borrowed"] == {"lot": 7}
+    assert bad.warnings[0].startswith("acc_bias.x ")
+    assert FIVE_POSITIONS[0].name in bad.warnings[1]
+    assert FIVE_POSITIONS[2].name in bad.warnings[1]
+    assert bad.warnings[2:] == ("latitude", "a lot", "scatter")
+    wrong.latitude_wrong = False
+    again = result.build_calibration("joint", observed(), SolveOptions(), whole(), [])
+    assert again.good and again.warnings == ("scatter",)
+
+
+def test_without_accelerometers_the_gyroscopes_are_what_agrees() -> None:
+    found = whole(names=("gyr_bias.y",), values=np.array([0.01]),
+                  covariance=np.array([[1e-10]]), shift_sigmas=np.zeros(1))  # fmt: skip
+    made = result.build_calibration("joint", observed(), SolveOptions(), found, [])
+    assert made.chi2 == 5.0

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -83,7 +85,9 @@ def test_columns_are_the_course_times_the_force_and_as_large_as_the_biases() -> 
     _, group = drift(d)
     found = warm_scale(d, group)
     assert found is not None
-    _, one = found
+    cause, one = found
+    assert one.effect is group.effect and one.shape == group.shape
+    assert one.params == (0, 1, 2) and not cause.reportable
     first, end, basis = list(d.basis_ranges())[-1]
     assert one.columns.tolist() == list(range(first, end))
     columns = basis.evaluate(RowView.of(d.x, d.since, NOMINAL))
@@ -148,6 +152,14 @@ def test_a_course_without_physics_may_be_the_temperatures(part: str, axes: int) 
         own = columns[:, :, c * count : (c + 1) * count]
         np.testing.assert_allclose(own[:, c], expected[:, c])
         assert not np.delete(own, c, axis=1).any()
+
+
+def test_columns_that_follow_no_course_cannot_be_the_temperatures() -> None:
+    general = [(0, 2, None), (2, 4, "columns of another kind")]
+    table: Any = SimpleNamespace(basis_ranges=lambda: general, unit=np.ones(6))
+    group = Group("time", "acc", np.array([2]), np.ones(1))
+    with pytest.raises(TypeError, match="^time is no course of biases$"):
+        warm_scale(table, group)
 
 
 def test_other_functions_without_physics_change_no_scale_factor() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from test_result import estimated, fit, observed
@@ -145,3 +147,76 @@ def test_gyroscopes_of_which_no_scale_factor_is_asked_for() -> None:
         " positions and the latitude"
     ]
     assert warnings.undetermined_warnings("joint", observed(gyr=False), found) == []
+
+
+def open_estimate(*undetermined: str, names: tuple[str, ...] = ("acc_bias.x",)) -> Any:
+    """An estimate of which some parameters are not determined."""
+    found: Any = estimated(undetermined=undetermined, names=names)
+    found.parameter_set.names = (*names, *undetermined)
+    return found
+
+
+def test_what_positions_leave_open_is_told_with_positions_that_mend_it() -> None:
+    flat = observed((Position.deg(0, 0), Position.deg(45, 0), Position.deg(20, 0)))
+    found = open_estimate(
+        "acc_bias.z", "acc_scale.z", names=("acc_bias.x", "acc_bias.y", "acc_scale.x",
+                                            "acc_scale.y")
+    )  # fmt: skip
+    assert warnings.undetermined_warnings("joint", flat, found) == [
+        "acc_bias.z and acc_scale.z are not determined by these positions: add"
+        " α = 45°, β = 5°"
+    ]
+    table = Position("", 0.0, 0.0, rate=(0.1, 0.0, 0.0))
+    turning = observed((*flat.positions, table))
+    assert warnings.undetermined_warnings("joint", turning, found) == [
+        "acc_bias.z and acc_scale.z are not determined by these positions"
+    ]
+
+
+def test_a_tilt_that_is_open_is_no_matter_where_the_level_is_stated() -> None:
+    found = open_estimate("base_tilt.about_x_deg")
+    (text,) = warnings.undetermined_warnings("joint", observed(), found)
+    assert text.startswith("base_tilt.about_x_deg is not determined by these positions")
+    found.parameter_set.options.level_deg = 0.1
+    assert warnings.undetermined_warnings("joint", observed(), found) == []
+
+
+def test_of_lengths_alone_orientations_are_what_is_missing() -> None:
+    found = open_estimate("acc_scale.z", names=("gyr_bias.x",))
+    seen = observed()
+    seen.mean[:, :3] *= 1.2
+    open_, force = warnings.undetermined_warnings("scalar", seen, found)
+    assert open_ == (
+        "acc_scale.z is not determined by these orientations: add positions with each"
+        " axis up and down"
+    )
+    assert force.startswith("|a| at rest is ") and force.endswith(
+        " % from gravity: biases or scale factors of the accelerometers are off by as"
+        " much, and these orientations do not show which; add positions in other"
+        " orientations"
+    )
+    known = open_estimate("acc_scale.z")
+    assert warnings.undetermined_warnings("scalar", seen, known) == [open_]
+
+
+def test_each_matrix_of_the_gyroscopes_is_told_by_itself() -> None:
+    of_one = {"gyr_scale.y": "gyr_scale.y",
+              "gyro_cross_coupling.s12": "1 of 6 gyro_cross_coupling"}  # fmt: skip
+    for name, what in of_one.items():
+        found = open_estimate(name)
+        found.parameter_set.options.turned = True
+        (text,) = warnings.undetermined_warnings("joint", observed(), found)
+        assert text == (
+            f"{what} is not determined by these turns: add turns about device axis y"
+            " while that axis is level"
+        )
+
+
+def test_the_position_in_doubt_stands_between_few_windows_and_scatter() -> None:
+    bad = np.array([0.0, 0.4, 0.0, 0.0, 0.0])
+    found = estimated(acc=fit(dof=0), bad_probability=bad)
+    few, doubt, *scatter = warnings.agreement_warnings("joint", observed(), found)
+    assert few == words.NO_DOF and FIVE_POSITIONS[1].name in doubt
+    assert scatter == warnings._scatter_warnings(found)
+    found = estimated(bad_probability=np.zeros(5))
+    assert not any(warnings.agreement_warnings("joint", observed(), found))

@@ -144,7 +144,7 @@ def test_the_mean_over_explanations_has_their_differences_in_its_covariance(
         value, variance = made[found]
         return np.array([value]), np.array([[variance]])
 
-    monkeypatch.setattr(averaging, "Search", lambda there, gram: None)
+    monkeypatch.setattr(averaging, "Sets", lambda there, gram: None)
     monkeypatch.setattr(averaging, "variants", variants)
     monkeypatch.setattr(averaging, "mixture_with_causes", mixture)
     monkeypatch.setattr(averaging, "_parameters_at_end", at_end)

@@ -18,7 +18,7 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.solve import estimation
 from fieldcal.solve.estimation import ParameterEstimate
-from fieldcal.solve.rows import rows_of_means
+from fieldcal.solve.observation_rows import rows_of_observations
 
 RNG = np.random.default_rng(5)
 
@@ -144,7 +144,7 @@ def test_what_the_factory_left_has_the_size_that_its_estimates_show() -> None:
         return {"quadratic": 0.25}
 
     one = estimate([], np.zeros(0), np.zeros((0, 0)), parameter_set=there,
-                   search=SimpleNamespace(evaluate=evaluate))  # fmt: skip
+                   sets=SimpleNamespace(evaluate=evaluate))  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(estimation, "chances_of_coarser", chances)
         assert one.coarser_probabilities(stated) == {"quadratic": 0.25}
@@ -186,7 +186,7 @@ def test_scatter_of_a_triad_is_the_root_of_its_mean_square() -> None:
 
 
 def test_means_have_no_turns() -> None:
-    rows = rows_of_means(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
+    rows = rows_of_observations(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
     assert rows.turn_integrator() is None
 
 
@@ -196,13 +196,13 @@ def test_a_recording_without_a_turn_has_nothing_to_integrate(
 ) -> None:
     tracker = SimpleNamespace(legs=legs)
     monkeypatch.setattr(estimation, "TurnTracker", lambda *told: tracker)
-    means = rows_of_means(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
+    means = rows_of_observations(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
     recorded = replace(means, source=cast(Any, "samples"))
     assert recorded.turn_integrator() is (cast(Any, tracker) if legs else None)
 
 
 def test_what_is_known_before_of_lot_and_filters() -> None:
-    recorded = rows_of_means(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
+    recorded = rows_of_observations(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
     nominal, nothing = cast(Any, None), SimpleNamespace(lot=None)
     columns = np.array([4, 7])
     there: Any = SimpleNamespace(options=nothing, filters=None)

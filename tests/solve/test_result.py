@@ -173,7 +173,7 @@ def whole(**known: Any) -> ParameterEstimate:
         "covariance": np.diag([1e-6, 1e-10]), "causes": {}, "turn_rows": (),
         "bad_probability": np.array([0.0, 0.01234, 0.5, 0.0, 0.0]),
         "any_cause_probability": 0.0, "shift_sigmas": np.zeros(2), "wrong_angles": (),
-        "contradicted_turns": (), "search": None,
+        "contradicted_turns": (), "sets": None,
         "acc": fit(rejects_model=False), "gyr": fit(chi2=5.0, rejects_model=False),
     }  # fmt: skip
     found = estimated(**(nothing | known))

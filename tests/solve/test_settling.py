@@ -16,7 +16,7 @@ from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.core.samples import Array
 from fieldcal.model.state import State
 from fieldcal.solve import settling
-from fieldcal.solve.rows import rows_of_means
+from fieldcal.solve.observation_rows import rows_of_observations
 
 WIDTH, SCALE = 12, 6
 
@@ -28,7 +28,7 @@ def state(*scale: float) -> State:
 
 @dataclass
 class MadeUp:
-    """An inference whose answers are known.
+    """A fit whose answers are known.
 
     Attributes
     ----------
@@ -46,8 +46,8 @@ class MadeUp:
 
     def __post_init__(self) -> None:
         self.nominal = state(1.0, 1.0, 1.0, 2.0, 2.0, 2.0)
-        tracker = SimpleNamespace(contradicted_turns=())
-        self.turns = SimpleNamespace(tracker=tracker) if self.has_turns else None
+        self.turns = "turns" if self.has_turns else None
+        self.contradicted_turns: tuple[None, ...] = ()
 
     def settle(self, start: State, values: Array, members: Any) -> Any:
         assert members == "members"
@@ -60,7 +60,7 @@ class MadeUp:
         self.done.append(("turns", float(about.scale[0])))
         if self.turns is not None:
             count = self.contradicted.get(float(about.scale[0]), 0)
-            self.turns.tracker.contradicted_turns = (None,) * count
+            self.contradicted_turns = (None,) * count
 
 
 THERE: Any = SimpleNamespace(width=WIDTH, scale=SCALE, members="members")
@@ -143,7 +143,7 @@ def test_the_fit_goes_on_from_where_fewer_turns_contradict_the_positions(
 
 
 def test_a_window_without_weight_has_noise_beyond_all() -> None:
-    rows = rows_of_means(observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS))).rows
+    rows = rows_of_observations(observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS))).rows
     there: Any = SimpleNamespace(window_positions=np.array([0, 2, 4]))
     left = np.array([False, True, True])
     found = settling._without_windows(rows, there, left)
@@ -166,7 +166,7 @@ def fits_of(
     """Fit where the windows that are left out determine which look bad."""
     fits: list[tuple[list[int], list[int]]] = []
 
-    def inference(system: Any, nominal: Any, turns: Any) -> Any:
+    def gauss_newton(system: Any, nominal: Any, turns: Any) -> Any:
         return SimpleNamespace(left=system, turn_rows=[])
 
     def fit(now: Any, about: Any, there: Any) -> Any:
@@ -174,7 +174,7 @@ def fits_of(
                      np.flatnonzero(about.left).tolist()))  # fmt: skip
         return "gram", Posterior(bad_by_left(now.left), -float(now.left.sum()))
 
-    monkeypatch.setattr(settling, "Inference", inference)
+    monkeypatch.setattr(settling, "GaussNewton", gauss_newton)
     monkeypatch.setattr(settling, "WindowSystem", lambda rows, there: rows)
     monkeypatch.setattr(
         settling, "_without_windows", lambda rows, there, left: left.copy()

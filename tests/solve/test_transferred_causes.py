@@ -16,8 +16,8 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.physics.effect import Scatter, Sensor
 from fieldcal.solve import explanations
 from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.observation_rows import rows_of_observations
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
-from fieldcal.solve.rows import rows_of_means
 
 OFFSET, BASE = TILTS
 
@@ -135,7 +135,7 @@ def test_parameters_that_a_rotation_makes_of_others_are_those_others(
 def test_where_gyroscopes_were_measured_they_may_drift_with_the_accelerometers() -> (
     None
 ):
-    rows = rows_of_means(replace(seen(), mean=np.nan_to_num(seen().mean)))
+    rows = rows_of_observations(replace(seen(), mean=np.nan_to_num(seen().mean)))
     x = replace(rows.rows.x, since_start=TIMES)
     shown = [WeightedExplanation((member("bias_drift"),), 1.0)]
     d = ParameterSet(

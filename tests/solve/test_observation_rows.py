@@ -13,14 +13,14 @@ from fieldcal.calibration import Nominal
 from fieldcal.core.base_motion import BaseMotion
 from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.core.samples import Array
-from fieldcal.solve.observations import Observations
-from fieldcal.solve.rows import (
+from fieldcal.solve.observation_rows import (
     mean_variances,
-    rows_of_means,
+    rows_of_observations,
     unknown_earth_rate,
     with_window_variances,
     without_angles,
 )
+from fieldcal.solve.observations import Observations
 
 G, EARTH = 9.8, 7.292115e-5
 HAND = Position("by hand", sigma=0.02)
@@ -37,11 +37,12 @@ def seen(positions: tuple[Position, ...], **known: Any) -> Observations:
 
 def test_there_is_one_row_for_each_window() -> None:
     three = (KNOWN, HAND, TABLE)
-    one = rows_of_means(seen(three, time=np.array([5.0, np.nan, 25.0])))
+    one = rows_of_observations(seen(three, time=np.array([5.0, 12.0, 25.0])))
     rows = one.rows
     assert rows.x.position.tolist() == [0, 1, 2]
-    assert rows.x.t.tolist() == [5.0, 1.0, 25.0]
-    assert rows.span.tolist() == [[5.0, 5.0], [1.0, 1.0], [25.0, 25.0]]
+    assert rows.x.t.tolist() == [5.0, 12.0, 25.0]
+    assert rows.x.since_start.tolist() == [0.0, 7.0, 20.0]
+    assert rows.span.tolist() == [[5.0, 5.0], [12.0, 12.0], [25.0, 25.0]]
     np.testing.assert_array_equal(rows.y, seen(three).mean)
     np.testing.assert_array_equal(rows.x.attitude_sigma, [np.nan, 0.02, np.nan])
     assert rows.x.gamma.tolist() == [0.0] * 3
@@ -51,19 +52,19 @@ def test_there_is_one_row_for_each_window() -> None:
 
 
 def test_noise_is_that_of_the_means() -> None:
-    rows = rows_of_means(seen(FIVE_POSITIONS)).rows
+    rows = rows_of_observations(seen(FIVE_POSITIONS)).rows
     np.testing.assert_allclose(rows.sd, [[1e-3] * 3 + [2e-5] * 3] * 5)
     np.testing.assert_allclose(rows.noise, [1e-3] * 3 + [2e-5] * 3)
     assert not rows.window_error.any()
     one = seen(FIVE_POSITIONS)
     one.covariance[1, 4, 4] = 0.0
-    assert np.isnan(rows_of_means(one).rows.sd[1, 4])
+    assert np.isnan(rows_of_observations(one).rows.sd[1, 4])
 
 
 def test_force_and_rate_are_those_of_the_device_axes() -> None:
     moving = BaseMotion(np.array([1e-6, 2e-6, 3e-6]), np.array([0.01, 0.5, -0.02]))
     turning = replace(KNOWN, rate=(0.1, 0.2, 0.3))
-    x = rows_of_means(
+    x = rows_of_observations(
         seen((KNOWN, turning), mounting=MOUNTING, base_motion=moving, latitude=0.7)
     ).rows.x
     alpha, beta = np.deg2rad([30.0, 10.0])
@@ -76,11 +77,11 @@ def test_force_and_rate_are_those_of_the_device_axes() -> None:
     turns = MOUNTING.T @ np.array([0.1, 0.2, 0.3])
     np.testing.assert_allclose(x.w[1], turns, atol=1e-5)
     assert x.latitude == 0.7
-    assert np.isnan(rows_of_means(seen((KNOWN,))).rows.x.latitude)
+    assert np.isnan(rows_of_observations(seen((KNOWN,))).rows.x.latitude)
 
 
 def test_a_force_of_unknown_direction_is_along_the_measured_one() -> None:
-    x = rows_of_means(seen((HAND, KNOWN), nominal=NOMINAL)).rows.x
+    x = rows_of_observations(seen((HAND, KNOWN), nominal=NOMINAL)).rows.x
     along = (np.array([1.0, -9.6, 2.0]) - [0.1, 0.2, -0.3]) / [2.0, 4.0, 5.0]
     np.testing.assert_allclose(x.f[0], G * along / np.linalg.norm(along))
     alpha, beta = np.deg2rad([30.0, 10.0])
@@ -94,11 +95,11 @@ def test_unseen_earth_is_an_error_of_windows_that_share_a_bias() -> None:
     error = unknown_earth_rate((1.0, -2.0, 4.0))
     sizes = np.array([1.0, 2.0, 4.0])
     np.testing.assert_allclose(error, (sizes * every).std(axis=0), rtol=0.01)
-    two = rows_of_means(seen((HAND, HAND), nominal=NOMINAL))
+    two = rows_of_observations(seen((HAND, HAND), nominal=NOMINAL))
     expected = EARTH / np.sqrt(3) * np.array([1.0, 2.0, 1.0])
     np.testing.assert_allclose(two.rows.window_error[:, 3:], np.tile(expected, (2, 1)))
     assert not two.rows.window_error[:, :3].any()
-    assert not rows_of_means(seen((HAND,))).rows.window_error.any()
+    assert not rows_of_observations(seen((HAND,))).rows.window_error.any()
 
 
 def test_by_hand_the_variance_along_the_force_counts_for_all_axes() -> None:
@@ -116,7 +117,9 @@ def test_by_hand_the_variance_along_the_force_counts_for_all_axes() -> None:
 
 
 def test_without_angles_forces_are_the_measured_ones_unless_a_table_turns() -> None:
-    rows = rows_of_means(seen((KNOWN, HAND, replace(KNOWN, rate=(0.0, 0.2, 0.0))))).rows
+    rows = rows_of_observations(
+        seen((KNOWN, HAND, replace(KNOWN, rate=(0.0, 0.2, 0.0))))
+    ).rows
     rows.y[1, 1] = np.nan
     found = without_angles(rows, NOMINAL)
     assert np.isnan(found.x.alpha).all() and np.isnan(found.x.beta).all()
@@ -126,7 +129,7 @@ def test_without_angles_forces_are_the_measured_ones_unless_a_table_turns() -> N
 
 
 def one_window(sd: Array, error: Array) -> Any:
-    rows = rows_of_means(seen((KNOWN, KNOWN, KNOWN, KNOWN))).rows
+    rows = rows_of_observations(seen((KNOWN, KNOWN, KNOWN, KNOWN))).rows
     x = replace(rows.x, position=np.array([0, 0, 1, 1]))
     return replace(rows, x=x, sd=sd, window_error=error)
 
@@ -171,7 +174,7 @@ def test_gyroscopes_that_see_the_earth_have_its_length_for_their_rate(
         many, outputs([KNOWN] * 8), gyr=length * turns, sigma_gyr=1e-9,
         latitude=latitude, grade="navigation", base_motion=base,
     )  # fmt: skip
-    x = rows_of_means(one).rows.x
+    x = rows_of_observations(one).rows.x
     np.testing.assert_allclose(x.w, length * turns, rtol=1e-3, atol=1e-8)
-    plain = rows_of_means(replace(one, grade="tactical")).rows.x
+    plain = rows_of_observations(replace(one, grade="tactical")).rows.x
     assert not plain.w.any()

@@ -33,7 +33,7 @@ from fieldcal.model.posterior.model_average import ModelAverage
 from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
 from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
-from fieldcal.model.posterior.way_information import way_information
+from fieldcal.model.posterior.turn_force_information import turn_force_information
 from fieldcal.model.rows.change_points import change_points
 from fieldcal.model.rows.interruptions import interruptions
 from fieldcal.model.rows.noise import rounding_noise
@@ -117,7 +117,9 @@ class Explanation:
         group = self.dictionary.filters
         if group is None:
             return None
-        return way_information(self.best.set, self.inferred.turn_rows, group.columns)
+        return turn_force_information(
+            self.best.set, self.inferred.turn_rows, group.columns
+        )
 
     @cached_property
     def turns(self) -> list[Turn]:

@@ -245,7 +245,9 @@ def _probability(explanation: Explanation, verdict: Verdict) -> float:
         return posterior.probability_of_noise_alone
     if verdict == "ambiguous" and explanation.undecided:
         return 1 - posterior.probability_of_noise_alone
-    wanted = [{cause.name, *cause.alike} for cause in explanation.probable_causes]
+    wanted = [
+        {cause.name, *cause.aliases_of_kind} for cause in explanation.probable_causes
+    ]
     return sum(
         w
         for s, w in posterior.weights

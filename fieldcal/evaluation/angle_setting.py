@@ -1,12 +1,14 @@
 """Uncertainty of set angles as a recording shows it.
 
-The diagnosis finds the scatter of the angles. Offsets of the accelerometers from
-position to position without a known cause may be errors of angles as well:
+The diagnosis finds the scatter of the set angles. Offsets of the accelerometers that
+differ from position to position without a known cause may be errors of angles too; the
+equivalent angle is
 
     sigma = max_c sqrt(mean_p o_pc^2) / g                                          (1)
 
-with the offset o_pc of output c in position p. The accelerometers cannot distinguish
-the two; in the turns between positions only errors of angles show.
+with the offset o_pc, m/s^2, of accelerometer c in position p, and sigma in rad. The
+accelerometers cannot distinguish offsets from errors of angles; in the turns between
+positions only errors of angles show.
 """
 
 from __future__ import annotations
@@ -41,11 +43,11 @@ BY_POSITION = ("window", "position", "alpha", "beta", "joints", "force")
 def shown_angle_setting(explanation: Explanation) -> float:
     """Scatter of set angles found in a recording, deg; 0 if none is found."""
     found = [0.0]
-    for one in explanation.probable_causes:
-        effect = catalogue().get(one.name)
+    for cause in explanation.probable_causes:
+        effect = catalogue().get(cause.name)
         if isinstance(effect, Scatter) and {p.unit for p in effect.params} == {"deg"}:
-            told = random_sizes(explanation, one).values()
-            found += [q.value for q in told if isinstance(q.value, float)]
+            sizes = random_sizes(explanation, cause).values()
+            found += [q.value for q in sizes if isinstance(q.value, float)]
     return max(found)
 
 
@@ -54,18 +56,19 @@ def angle_equivalent_of_offsets(explanation: Explanation) -> float:
     x, d = explanation.rows.x, explanation.dictionary
     unknown = [
         group.columns
-        for one in explanation.probable_causes
-        if one.kind == "unknown" and one.name in BY_POSITION
-        for _, group in one.members
+        for cause in explanation.probable_causes
+        if cause.kind == "unknown" and cause.name in BY_POSITION
+        for _, group in cause.members
     ]
     if not unknown or not x.oriented.any():
         return 0.0
     fitted = replace(explanation.best, set=explanation.posterior.best)
-    whole, less = fitted.estimate, fitted.estimate
-    less[np.concatenate(unknown)] = 0.0
-    off = (fitted.residual(less) - fitted.residual(whole))[:, ACC] / d.unit[ACC]
+    estimate, without_unknown = fitted.estimate, fitted.estimate
+    without_unknown[np.concatenate(unknown)] = 0.0
+    offset = fitted.residual(without_unknown) - fitted.residual(estimate)
+    offset = offset[:, ACC] / d.unit[ACC]
     held = np.unique(x.position[x.oriented])
-    mean = np.array([np.nan_to_num(off[x.position == p]).mean(axis=0) for p in held])
+    mean = np.array([np.nan_to_num(offset[x.position == p]).mean(axis=0) for p in held])
     size = np.sqrt((mean**2).mean(axis=0)).max() / x.gravity  # (1)
     return float(np.rad2deg(size))
 
@@ -75,9 +78,9 @@ def with_shown_angle_setting(
 ) -> tuple[Calibration, list[str]]:
     """Fit with the stated uncertainty of angles, or the larger one that is shown.
 
-    Returns the result and sentences. The larger one is used only if it has more
-    evidence: the requested parameters, such as a tilt of the base, may explain the
-    scatter as well.
+    Returns the result and sentences for the user. The larger uncertainty is used only
+    if it has more evidence, because the requested parameters, such as a tilt of the
+    base, may explain the scatter as well.
 
     Parameters
     ----------

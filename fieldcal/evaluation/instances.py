@@ -2,9 +2,10 @@
 
     |a_k| = R in every rest k                                                       (1)
 
-R is the radius of a sphere through the means of an IMU's rests, if these point in all
-directions, so that its bias cancels; otherwise their median length. An IMU whose R is
-far from that of the others is marked as out; of two, the one that is farther from g.
+a_k is the mean of the accelerometers in rest k, m/s^2. If the rests of an IMU point in
+all directions, R is the radius of a sphere through its a_k, in which the bias cancels.
+Otherwise R is the median of |a_k|. An IMU whose R is far from that of the others is
+marked as out; of two IMUs, the one with R farther from g.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ USUAL_ERROR, USUAL_ERROR_WITH_BIAS = 0.01, 0.03
 """Usual error of a sensor as delivered, as a part of g, without and with its bias."""
 
 MIN_OUTLIER_RATIO = 4.0
-"""Smallest difference of an IMU that is out, in median differences of the others."""
+"""Least difference of an IMU that is out, over the median difference of the others."""
 
 MIN_RESTS = 6
-"""Fewest rests for a sphere."""
+"""Fewest rests to which a sphere is fitted."""
 
 ROUND = 1e-2
 """Smallest singular value, relative to the largest, of rests in all directions."""
@@ -40,7 +41,7 @@ class Instance(NamedTuple):
     every_way : whether the rests point in all directions, so that bias cancels
     rests : number of rests
     of_g : R / g - 1
-    of_others : R over the median of the others, less 1; nan where there are none
+    of_others : R over the median R of the other IMUs, less 1; nan without others
     out : whether it differs too much from the others
 
     """
@@ -86,7 +87,7 @@ def compare_instances(rests: Mapping[str, Array], gravity: float) -> list[Instan
     """
     known = {n: means[np.isfinite(means).all(axis=1)] for n, means in rests.items()}
     found = {name: _rest_length(means) for name, means in known.items() if len(means)}
-    sizes = {name: one[0] for name, one in found.items()}
+    sizes = {name: size for name, (size, _, _) in found.items()}
     out = []
     for name, (size, sigma, every_way) in found.items():
         others = np.array([s for n, s in sizes.items() if n != name])
@@ -105,11 +106,11 @@ def _is_out(size: float, others: Array, gravity: float, usual: float) -> bool:
     if not len(others):
         return False
     middle = float(np.median(others))
-    off = abs(size / middle - 1)
-    if off < usual or abs(size - gravity) < abs(middle - gravity):
+    difference = abs(size / middle - 1)
+    if difference < usual or abs(size - gravity) < abs(middle - gravity):
         return False
-    differ = float(np.median(np.abs(others / middle - 1)))
-    return len(others) == 1 or off > MIN_OUTLIER_RATIO * differ
+    of_others = float(np.median(np.abs(others / middle - 1)))
+    return len(others) == 1 or difference > MIN_OUTLIER_RATIO * of_others
 
 
 def _rest_length(means: Array) -> tuple[float, float, bool]:
@@ -122,8 +123,9 @@ def _rest_length(means: Array) -> tuple[float, float, bool]:
         if singular[-1] > ROUND * singular[0]:
             center = np.linalg.lstsq(left, lengths**2, rcond=None)[0]
             radius = float(np.sqrt(center[3] + center[:3] @ center[:3]))
-            away = np.linalg.norm(means - center[:3], axis=1) - radius
+            residual = np.linalg.norm(means - center[:3], axis=1) - radius
             spare = len(means) - len(center)
-            return radius, float(np.sqrt((away @ away) / spare / len(means))), True
+            variance = (residual @ residual) / spare / len(means)
+            return radius, float(np.sqrt(variance)), True
     sigma = lengths.std(ddof=1) / np.sqrt(len(lengths)) if len(lengths) > 1 else np.nan
     return float(np.median(lengths)), float(sigma), False

@@ -1,4 +1,4 @@
-"""A jump of the biases that a recording shows, stated beside its calibration."""
+"""Adds a jump of the biases that a recording shows to the info of its calibration."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def with_jump(calibration: Calibration, shown: Explanation) -> Calibration:
     `jump` has the time `at_s`, and under `bias`, by full name, change and standard
     uncertainty, m/s^2 and rad/s, as far as the recording determines them.
     """
-    for standing in shown.probable_causes:
-        if standing.name == JUMP:
-            told = parameter_estimates(shown, standing)
+    for cause in shown.probable_causes:
+        if cause.name == JUMP:
+            estimates = parameter_estimates(shown, cause)
             bias = {
                 NAMES[channel]: [quantity.value, quantity.sigma]
-                for channel, quantity in told.items()
+                for channel, quantity in estimates.items()
                 if channel in NAMES
             }
-            info = {"at_s": told["at_s"].value, "bias": bias}
+            info = {"at_s": estimates["at_s"].value, "bias": bias}
             return replace(calibration, info={**calibration.info, "jump": info})
     return calibration

@@ -1,12 +1,13 @@
 """Whether the recording contradicts how level the base is stated to be.
 
-A stated level of standard uncertainty s is a prior of the tilt. A larger tilt is then
-taken for biases, and the fit is as good as before. The same rows without the statement
-give the tilt t with covariance C, and
+A level with the stated standard uncertainty s, deg, is a prior of the base tilt. If the
+true tilt is larger, the fit attributes it to biases, and its residuals do not show it.
+Therefore the same rows are solved without this prior, which gives the tilt t, deg, with
+the covariance C. If the statement is true,
 
     chi2 = t^T (C + s^2 I)^-1 t                                                   (1)
 
-has as many degrees of freedom as t has axes, if the statement is true.
+has a chi-squared distribution with as many degrees of freedom as t has axes.
 """
 
 from __future__ import annotations

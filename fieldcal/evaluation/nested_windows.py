@@ -1,22 +1,22 @@
 """How long to average: a session solved with shorter and shorter windows.
 
-The first T of each window is used. A parameter then has a value x(T) with uncertainty
-s(T). n(T) is the part of s(T) from the noise of the means; the part r from fixture,
-level and factory is about the same at every T,
+Only the first T seconds of each window are used. Each parameter then has a value x(T)
+with the uncertainty s(T). n(T) is the part of s(T) by the noise of the means. The other
+part r, by the errors of fixture, level and factory, is about the same at every T,
 
     r^2 = s^2(T) - n^2(T)                                                          (1)
 
-White noise falls as 1 / sqrt(T), and nested means differ by
+For white noise, n falls as 1 / sqrt(T), and the difference of nested means has
 
     var(x(T) - x(T')) = n^2 (1 - T/T')             n the larger of both, T < T'    (2)
 
-The error that exceeds noise first, and from which T, is one of
+The dominant error of a parameter is that which exceeds noise at the smallest T:
 
     the fixture     r > n(T)                                                       (3)
     flicker         n^2(T) T > 2 n^2(T0) T0                 T0 the shortest time    (4)
     drift           x(T') is further from x(T) than (2) allows                     (5)
 
-where (5) is a disturbance as well. Source: (2) of white noise, whose increments are
+A disturbance also makes (5) true. Source: (2) of white noise, whose increments are
 independent. Units are those of the parameters; s.
 """
 
@@ -46,10 +46,11 @@ TIMES = (5, 10, 15, 30, 45, 60, 120, 300, 600, 1800, 3600)
 """Lengths that are tried besides the whole window, s."""
 
 SHORTER = 0.8
-"""Largest length that is tried, as a part of the whole window."""
+"""Largest of these lengths that is tried, as a part of the whole window."""
 
 MIN_CHANGE_SIGMAS = 4.0
-"""Standard deviations of (2) beyond which a change, of a hundred, is not noise."""
+"""Standard deviations of (2) from which a change is no noise, among a hundred
+changes."""
 
 EXACT_DEG = 1e-6
 """Level, heading and angles of a fixture that leaves nothing, deg."""
@@ -79,20 +80,20 @@ class NestedWindows:
         k = self.names.index(name)
         x, n, rest = self.values[:, k], self.noise[:, k], self._systematic_sigma(k)
         share = 1 - self.seconds[:-1] / self.seconds[1:]
-        apart = np.maximum(n[:-1], n[1:]) * np.sqrt(share)  # (2)
-        jumped = np.append(False, np.abs(np.diff(x)) > MIN_CHANGE_SIGMAS * apart)
+        sigma = np.maximum(n[:-1], n[1:]) * np.sqrt(share)  # (2)
+        jumped = np.append(False, np.abs(np.diff(x)) > MIN_CHANGE_SIGMAS * sigma)
         white = n[0] ** 2 * self.seconds[0]
-        each = {
+        exceeds = {
             "fixture": rest > n,  # (3)
             "flicker": n**2 * self.seconds > 2 * white,  # (4)
             "drift": jumped,  # (5)
         }
         first = {
-            what: float(self.seconds[np.argmax(there)])
-            for what, there in each.items()
-            if there.any()
+            error: float(self.seconds[np.argmax(at)])
+            for error, at in exceeds.items()
+            if at.any()
         }
-        return min(first.items(), key=lambda one: one[1]) if first else None
+        return min(first.items(), key=lambda error: error[1]) if first else None
 
     def _systematic_sigma(self, k: int) -> Array:
         """Part r of the uncertainty that is not noise of the means, (t,), (1)."""
@@ -102,13 +103,15 @@ class NestedWindows:
         """Return the object of result.json."""
         out: dict[str, Any] = {"seconds": self.seconds.tolist(), "parameters": {}}
         for k, name in enumerate(self.names):
-            won = self.dominant_error(name)
+            dominant = self.dominant_error(name)
             out["parameters"][name] = {
                 "unit": self.units[k],
                 "value": self.values[:, k].tolist(),
                 "sigma": self.sigma[:, k].tolist(),
                 "noise": self.noise[:, k].tolist(),
-                "wins": None if won is None else {"what": won[0], "from_s": won[1]},
+                "wins": None
+                if dominant is None
+                else {"what": dominant[0], "from_s": dominant[1]},
             }
         return out
 
@@ -163,7 +166,7 @@ def _solve_first_seconds(
             factory=factory_errors(about),
         )
         level = None if about.level_deg is None else EXACT_DEG
-        alone = solve(
+        noise_only = solve(
             seen,
             level_sigma_deg=level,
             heading_sigma_deg=EXACT_DEG,
@@ -173,7 +176,9 @@ def _solve_first_seconds(
     except FieldcalError:
         return None
     return (
-        (whole, alone) if len(taken.position_numbers) == len(about.positions) else None
+        (whole, noise_only)
+        if len(taken.position_numbers) == len(about.positions)
+        else None
     )
 
 

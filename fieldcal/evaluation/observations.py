@@ -1,7 +1,7 @@
 """Makes the observations of the estimators from the windows of a session.
 
-A window with no calm part or no samples is left out, and so is a sensor that does not
-respond in any window. Both are reported.
+A window without samples or without a calm part is left out. A sensor with an axis that
+never changes is left out of all windows. Warnings name both.
 """
 
 from __future__ import annotations
@@ -158,30 +158,30 @@ def _windows_without(
     averages: Sequence[Average],
     warnings: Sequence[str],
 ) -> UsableWindows:
-    """The windows without sensors that cannot be used, which the warnings name."""
-    for one in dead:
-        averages = [_without_sensor(average, one.channels) for average in averages]
+    """The windows with nan for the sensors `dead`, and their messages as warnings."""
+    for sensor in dead:
+        averages = [_without_sensor(average, sensor.channels) for average in averages]
     return UsableWindows(
-        tuple(rows), tuple(averages), (*warnings, *(one.message for one in dead))
+        tuple(rows), tuple(averages), (*warnings, *(sensor.message for sensor in dead))
     )
 
 
 def _without_dead_axes(block: Block) -> Block:
     """The samples with dead axes set to nan."""
-    told = without_dead_axes(block.six)
-    return replace(block, acc=told[:, :3], gyr=told[:, 3:])
+    six = without_dead_axes(block.six)
+    return replace(block, acc=six[:, :3], gyr=six[:, 3:])
 
 
 def _average_windows(
-    session: Session, block: Block, said: list[str]
+    session: Session, block: Block, warnings: list[str]
 ) -> dict[int, Average]:
-    """Averages by position number; sentences about omitted windows go to `said`."""
+    """Averages by position number; appends sentences about windows to `warnings`."""
     about, grain = session.about, _rounding_grain(session)
-    said += _range_warnings(session)
+    warnings += _range_warnings(session)
     sways = find_base_sway(block, about)
     if sways is not None:
         block = sways.block
-        said.append(sways.sentence)
+        warnings.append(sways.sentence)
     taken: dict[int, Average] = {}
     noise: LearnedNoise | None = None
     held = about.in_time_order()
@@ -194,17 +194,17 @@ def _average_windows(
             else:
                 found, noise, remark = average_window(block, window, noise, grain)
         except FieldcalError as error:
-            said.append(f"{_position_label(session, i)} is left out: {error}")
+            warnings.append(f"{_position_label(session, i)} is left out: {error}")
             continue
         if sways is not None:
-            more = np.diag(sways.excess_variance[i])
-            found = replace(found, covariance=found.covariance + more)
+            by_sway = np.diag(sways.excess_variance[i])
+            found = replace(found, covariance=found.covariance + by_sway)
         taken[i] = found
         if remark:
-            said.append(f"{_position_label(session, i)}: {remark}")
+            warnings.append(f"{_position_label(session, i)}: {remark}")
     for i, missing in _incomplete(taken, about).items():
         del taken[i]
-        said.append(
+        warnings.append(
             f"{_position_label(session, i)} is left out: its window has no"
             f" {join_words(missing)}, which others have; take it again"
         )
@@ -300,16 +300,17 @@ def _missing_unit_hint(about: Description) -> str:
 
 
 def _rounding_grain(session: Session) -> Grain:
-    """Rounding that the device reported, or that seen in turns where windows hide it.
+    """Rounding that the device reported, or else its steps as the recording shows them.
 
-    An output that repeats one value throughout a window hides its noise and its step.
+    The latter only if an output repeats one value throughout a window, which then does
+    not show its noise and its step.
     """
-    told, block = reported_grain(session), session.block
-    if told.step.all():
-        return told
+    reported, block = reported_grain(session), session.block
+    if reported.step.all():
+        return reported
     steps = np.where(_constant(session), grids_of(block), 0.0)
     acc, gyr = float(steps[ACC].max()), float(steps[GYR].max())
-    return Grain(told.acc or acc, told.gyr or gyr, told.cut)
+    return Grain(reported.acc or acc, reported.gyr or gyr, reported.cut)
 
 
 def _constant(session: Session) -> NDArray[np.bool_]:

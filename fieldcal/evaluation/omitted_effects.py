@@ -1,13 +1,14 @@
 """Effects that a recording shows and a calibration does not contain.
 
-`solve` fits bias, scale factor and the requested parameters. A bias that drifted, a
-joint that was read wrongly or a byte that was decoded wrongly is in its windows as
-well. The diagnosis states which effects are present. For those that the calibration
-does not contain, the change of each parameter is
+`solve` fits bias, scale factor and the requested parameters. The same windows may
+contain other effects: a bias that drifts, a wrong angle of a joint, a wrongly decoded
+byte. The diagnosis states which effects are present. For those that the calibration
+does not contain, the shift of each parameter k is
 
     shift_k = (value with all effects - value without the omitted ones) / sigma_k
 
-Both values come from the same model and rows, so that conventions do not matter.
+Both values come from the same model and rows, so that the shift does not depend on
+conventions of axes and signs.
 """
 
 from __future__ import annotations
@@ -123,18 +124,18 @@ def wrong_angle_sentences(explanation: Explanation) -> list[str]:
     return out
 
 
-def _describe_wrong_angles(explanation: Explanation, standing: ProbableCause) -> str:
+def _describe_wrong_angles(explanation: Explanation, cause: ProbableCause) -> str:
     """Wrong angles in words, with their positions and sizes."""
     in_file = explanation.prepared.source.about.indices_in_file
-    pairs = exchanged_positions(explanation, standing)
+    pairs = exchanged_positions(explanation, cause)
     exchanged = {p for pair in pairs for p in pair}
-    told = [f"that {exchange_text(in_file(pair))}" for pair in pairs]
-    for positions, angles in angle_errors(explanation, standing).items():
+    phrases = [f"that {exchange_text(in_file(pair))}" for pair in pairs]
+    for positions, angles in angle_errors(explanation, cause).items():
         where = list_positions(in_file(positions))
         if exchanged.isdisjoint(positions):
             what = f", as {angle_errors_text(angles)}" if angles else ""
-            told.append(f"a wrong angle{what} in {where}")
-    return " and ".join(told)
+            phrases.append(f"a wrong angle{what} in {where}")
+    return " and ".join(phrases)
 
 
 def _is_included(calibration: Calibration, standing: ProbableCause) -> bool:
@@ -162,12 +163,12 @@ def _shift_sigmas(
     names = {s.name for s in out}
     best = explanation.posterior.best
     kept = tuple(m for m in best.members if m[0].name not in names)
-    less = explanation.posterior.sets.reduced(best, kept)
-    now, before = (calibration_of_set(explanation, one) for one in (best, less))
+    reduced = explanation.posterior.sets.reduced(best, kept)
+    full, without = (calibration_of_set(explanation, s) for s in (best, reduced))
     return {
-        name: float((now[name][0] - before[name][0]) / before[name][1])
-        for name in now
-        if name in before and before[name][1] > 0 and np.isfinite(now[name][0])
+        name: float((full[name][0] - without[name][0]) / without[name][1])
+        for name in full
+        if name in without and without[name][1] > 0 and np.isfinite(full[name][0])
     }
 
 

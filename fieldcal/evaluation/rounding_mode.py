@@ -1,16 +1,17 @@
-"""How a device rounds if this is not stated.
+"""Estimates how the accelerometers round if the device does not state it.
 
-Values on a grid of steps q are right on average where they are rounded to the nearest;
-cut toward zero, as a conversion to integers does, they are q / 2 too small in size;
-rounded down, as a shift of bits does, q / 2 too small. A mean of v shows no
-difference, but zero does: cut toward zero it is all between -q and q, twice as wide as
-any other value. An output that passes from -2 q to 2 q or back without resting rests on
-zero for n0 samples and on its neighbours for n1 in the mean, and
+Values on a grid of step q, m/s^2, are right on average if they are rounded to the
+nearest. If they are cut toward zero, as by a conversion to integers, their size is q /
+2 too small on average. If they are rounded down, as by a shift of bits, they are q / 2
+too small. A mean does not show which is the case, but the value zero does: if values
+are cut toward zero, all between -q and q become zero, an interval twice as wide as that
+of any other value. An output that passes from -2 q to 2 q or back without resting is
+zero for n0 samples, and has each neighbouring value for n1 samples on average, with
 
     ln (n0 / n1) ~ N(ln 2, s^2) if cut, N(0, s^2) if not,   s^2 = S^2 + 2 / n1     (1)
 
-over all passes of all outputs, where S is how unsteadily a turn passes. The device has
-one firmware, so it is one mode for all.
+over all passes of all outputs. S is the scatter by the changing rate of a turn. The
+device has one firmware, so all outputs have the same mode.
 
 The error of values rounded down is added to the variance of the biases. That of values
 cut toward zero depends on the signs of the means, and is in the model
@@ -38,8 +39,8 @@ UNSTEADY = 0.3
 """S of (1), ln: scatter of the times in which a turn passes neighbouring values."""
 
 MAX_DWELL_RATIO = 2.0
-"""Largest ratio of the times at the two neighbours of zero: a device that comes to rest
-at zero or beside it does not pass it."""
+"""Largest ratio of the times at the two neighbours of zero. With a larger one the
+device probably rested there, which is no pass."""
 
 PASSED = 2
 """Fewest samples of each neighbour in a pass."""
@@ -86,15 +87,15 @@ def rounding_mode(session: Session, grain: Grain) -> RoundingMode:
     acc = session.block.acc
     seen = np.zeros(3) if session.about.means_only else grids_of(session.block)[:3]
     step = np.where(grain.step[:3] > 0, 0.0, seen)
-    shown = [
-        ratio
+    passes = [
+        counts
         for values, q in zip(acc.T, step, strict=True)
         if q > 0
-        for ratio in zero_crossings(
+        for counts in zero_crossings(
             np.rint(values[np.isfinite(values)] / q).astype(np.intp)
         )
     ]
-    return RoundingMode(step, cut_probability(shown))
+    return RoundingMode(step, cut_probability(passes))
 
 
 def with_rounding_uncertainty(found: Calibration, mode: RoundingMode) -> Calibration:
@@ -107,7 +108,7 @@ def with_rounding_uncertainty(found: Calibration, mode: RoundingMode) -> Calibra
     return replace(found, covariance=covariance)
 
 
-def cut_probability(shown: list[tuple[int, float]]) -> float:
+def cut_probability(passes: list[tuple[int, float]]) -> float:
     """Probability that values were cut toward zero, from (n0, n1) of passes, (1).
 
     >>> round(cut_probability([]), 3)
@@ -118,10 +119,11 @@ def cut_probability(shown: list[tuple[int, float]]) -> float:
     True
     """
     log_odds = float(np.log(CUT_CHANCE / (1 - CUT_CHANCE)))
-    for zero, beside in shown:
-        variance = UNSTEADY**2 + 2 / beside
-        off = float(np.log(max(zero, 0.5) / beside))
-        log_odds += (off**2 - (off - np.log(2.0)) ** 2) / (2 * variance)
+    for zero, neighbour in passes:
+        variance = UNSTEADY**2 + 2 / neighbour
+        log_ratio = float(np.log(max(zero, 0.5) / neighbour))
+        difference = log_ratio**2 - (log_ratio - np.log(2.0)) ** 2
+        log_odds += difference / (2 * variance)
     return float(probability_of_log_odds(log_odds))
 
 
@@ -133,10 +135,10 @@ def zero_crossings(value: NDArray[np.intp]) -> Iterator[tuple[int, float]]:
             continue
         between = value[first + 1 : last]
         below, zero, above = (int((between == k).sum()) for k in (-1, 0, 1))
-        less, more = sorted((below, above))
+        shorter, longer = sorted((below, above))
         if (
-            less >= PASSED
-            and more <= MAX_DWELL_RATIO * less
-            and zero <= 2 * MAX_DWELL_RATIO * more
+            shorter >= PASSED
+            and longer <= MAX_DWELL_RATIO * shorter
+            and zero <= 2 * MAX_DWELL_RATIO * longer
         ):
             yield zero, (below + above) / 2

@@ -174,13 +174,10 @@ def solve_session(
 ) -> Calibration:
     """Solve a session.
 
-    Parameters
-    ----------
-    session : the recording
-    windows : its usable windows
-    turns : whether the turns between windows are used; "yes" requires them
-    left : sizes of factory errors by the keys of session.toml; they replace those of
-        session.toml and the usual ones of the grade
+    Parameters ---------- session : the recording windows : its usable windows turns :
+    whether the turns between windows are used; "yes" requires them left : sizes of the
+    factory errors by the keys of session.toml; they replace those in
+        session.toml and those of the grade
     options : arguments of `fieldcal.solve.solve`; defaults for the level of the base
         and the setting of angles come from session.toml, or from the grade
 
@@ -317,7 +314,7 @@ def _require_turns(
 def _with_numbers_of_session(
     calibration: Calibration, prepared: PreparedSession
 ) -> Calibration:
-    """Put what is said of single positions in the order of session.toml.
+    """Put the results for single positions in the order of session.toml.
 
     The probabilities of bad positions are those of the used windows; wrong positions
     are numbered among all.

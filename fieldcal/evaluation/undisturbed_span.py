@@ -1,9 +1,9 @@
 """Span of a disturbed window in which the device stayed in the same position.
 
 The mean of a disturbed window is that of its longest calm part (`window_mean`). The
-samples before and after the disturbance also count, if the device was still in its
-position at the ends of the window: they show whether the base has moved. A device that
-was turned away before its window ended measures another force at the end.
+samples before and after the disturbance are used too, if the device was in the same
+position at the ends of the window, because they show whether the base has moved. If the
+device was turned away before its window ended, the force at the end differs.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from fieldcal.core.samples import Block
 from fieldcal.windows import Average
 
 END_S = 1.0
-"""Length of the part at an end of the window that is compared, s. At least as much lies
-between it and the calm part."""
+"""Length of the part at an end of the window that is compared, s. The distance from it
+to the calm part is at least as long."""
 
 SAME_FORCE_TOLERANCE = 0.05
-"""Largest difference of the force in the same position, as a part of it: 3 degrees."""
+"""Largest difference of the force in the same position, as a part of the force; as an
+angle it is 3 degrees."""
 
 Span = tuple[float, float]
 

@@ -1,8 +1,8 @@
 """Average of one window of a recorded session.
 
-A window that was marked by somebody else may contain a disturbance. Its mean is then
-that of its longest calm part, with a remark. On a rate table gravity rotates in the
-device, and the accelerometers are not used.
+A window that was not recorded by a live run may contain a disturbance. Its mean is then
+that of its longest calm part, and a remark says so. On a rate table gravity rotates in
+device axes, and the accelerometers are not used.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def average_window(
     noise: LearnedNoise | None,
     grain: Grain,
 ) -> tuple[Average, LearnedNoise | None, str]:
-    """Average of a window, the noise learned from it, and a remark or empty.
+    """Average of a window, the noise learned from it, and a remark, "" if none.
 
     Parameters
     ----------
@@ -123,11 +123,11 @@ def average_turntable_window(
     Otherwise as `average_window`.
     """
     span = _known_span(span)
-    standing, left = without_table_rotation(block.between(*span), rate)
-    one, _, remark = average_window(standing, span, None, grain)
-    covariance = one.covariance.copy()
-    covariance[3:, 3:] += left
-    return replace(one, covariance=covariance), remark
+    at_rest, by_rotation = without_table_rotation(block.between(*span), rate)
+    mean, _, remark = average_window(at_rest, span, None, grain)
+    covariance = mean.covariance.copy()
+    covariance[3:, 3:] += by_rotation
+    return replace(mean, covariance=covariance), remark
 
 
 def _average_calm_part(
@@ -147,7 +147,7 @@ def _average_calm_part(
             found: Average | None = average(side, noise=noise, grain=grain)
         except Moved as again:
             inside = side.t[0] < again.at < side.t[-1]
-            # a disturbance lasts: what follows its first instant is disturbed as well
+            # a disturbance lasts: the samples after its first instant are disturbed too
             shifted = again.at if inside else side.t[0] + 1.0
             found = _average_calm_part(
                 side, Moved(str(again), shifted, again.axis), noise, grain

@@ -2,11 +2,11 @@
 
     sigma^2(tau) = <(y_k+1 - y_k)^2> / 2          y: means over tau, overlapping
 
-It is the standard error of a mean over tau, as estimated from the next mean. It falls
+It is the standard error of a mean over tau s as an estimate of the next mean. It falls
 as 1/sqrt(tau) for white noise, is constant for flicker (the bias instability), and
-rises for a random walk, where a longer mean is a worse one. Device
-axes, SI. Source: IEEE 952-1997 annex C; intervals by Greenhall and Riley 2003. The sums
-are allantools', which fieldcal installs as its extra ``allan``.
+rises for a random walk, for which a longer mean is less accurate. Device axes, SI.
+Source: IEEE 952-1997 annex C; intervals by Greenhall and Riley 2003. The sums are
+allantools', which fieldcal installs as its extra ``allan``.
 """
 
 from __future__ import annotations
@@ -27,10 +27,11 @@ MIN_RECORDING_S = 60.0
 """Shortest recording that is evaluated, s."""
 
 MAX_GAP_S = 1.0
-"""Longest gap that is tolerated, s; of slow samples the longest that is no pause."""
+"""Longest gap that is tolerated, s; if samples are seldom, the longest that is no
+pause."""
 
 AVERAGES = 4
-"""Fewest means a deviation is taken from: the longest tau is a fourth of the record."""
+"""Fewest means for a deviation: the longest tau is a fourth of the recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +76,9 @@ class AllanDeviation:
 
     @property
     def best(self) -> Array:
-        """Time after which more averaging makes no channel's mean better, (6,) s.
+        """Averaging time with the least deviation of each channel, (6,) s.
 
-        The longest tau where the deviation still falls at the end of the recording;
+        It is the longest tau if the deviation still falls at the end of the recording;
         nan where not measured.
         """
         filled = np.where(np.isnan(self.deviation), np.inf, self.deviation)

@@ -6,9 +6,9 @@ origin, and the sum D_c of m_c squared differences of successive values. From th
     y_c = S_c / n_c                    mean of the cell
     q_c = D_c / (2 m_c)                variance of the short-lag noise in the cell
 
-follow the mean of a window, its error and the test for rest. Their cost therefore does
+the mean of a window, its error and the test for rest are calculated. Their cost does
 not depend on the sample rate, and their result does not depend on how the samples were
-cut into blocks. A nan is a missing value and enters neither sum. Device axes, SI.
+divided into blocks. A nan is a missing value and is in no sum. Device axes, SI.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _CHUNK = 8192
 """Samples summed at a time, so that they stay in the processor's cache."""
 
 _GRACE = 1e-5
-"""Part of a cell by which a time may miss its edge through rounding."""
+"""Largest rounding error of the time of an edge, in lengths of a cell."""
 
 
 SamplesBetween = Callable[[float, float], Iterable[Block]]
@@ -47,7 +47,7 @@ class CellRows(Protocol):
         """Count the cells."""
 
     def __getitem__(self, some: slice, /) -> Array:
-        """Give some of them, (k, 35)."""
+        """Return the cells of a slice, (k, 35): start, s, and 34 sums."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +193,7 @@ class CellAccumulator:
 
     Attributes
     ----------
-    n : samples taken in
+    n : number of samples so far
     start, end : first and last instant, s of device time; nan before the first sample
 
     """
@@ -257,9 +257,9 @@ class CellAccumulator:
         self._append(index[first], sums)
 
     def _centred(self, block: Block) -> Array:
-        """Values less the origin behind the one before, (6, 1 + n).
+        """Values less the origin, after the last one of the block before, (6, 1 + n).
 
-        A channel lies in one piece: sums over it take half the time.
+        The values of a channel are contiguous in memory, which halves the time of sums.
         """
         for channel in np.flatnonzero(np.isnan(self._origin)):
             triad = block.acc if channel < 3 else block.gyr
@@ -315,7 +315,7 @@ def _ratio(sums: Array, counts: Array) -> Array:
 
 
 def fill_with_previous(means: Array, before: Array | None = None) -> Array:
-    """Means (m, c) with the one before where one is missing, 0 before the first.
+    """Means (m, c) in which a missing one is replaced by the previous one, or 0.
 
     Parameters
     ----------

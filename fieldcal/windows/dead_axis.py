@@ -17,13 +17,14 @@ from fieldcal.core.sentences import join_words
 from fieldcal.windows.cells import CellRows, SamplesBetween
 
 MIN_CHANGING_SHARE = 0.5
-"""Part of samples that differ from the previous one if noise exceeds the step."""
+"""Least part of samples that differ from the previous one if noise exceeds the step."""
 
 _PART = 1 << 12
-"""Cells looked through at a time."""
+"""Number of cells that are read at a time."""
 
 _SUMS, _FINEST = (1, 7, 13, 19), slice(27, 33)
-"""Columns of `CellRows` with the sums of a channel, and with its smallest change."""
+"""Columns of `CellRows`: the first of each of the sums n, S, D and m, and the smallest
+changes of the six channels."""
 
 
 class DeadSensor(NamedTuple):
@@ -157,7 +158,7 @@ class LiveAxisRows:
         return len(self._rows)
 
     def __getitem__(self, some: slice, /) -> Array:
-        """Give some of them, (k, 35)."""
+        """Return the cells of a slice, (k, 35)."""
         rows = self._rows[some]
         if len(self._dead):
             rows = rows.copy()
@@ -165,7 +166,7 @@ class LiveAxisRows:
         return rows
 
     def samples_without_dead_axes(self, between: SamplesBetween) -> SamplesBetween:
-        """Samples of the recording without these axes."""
+        """The function `between`, with nan for axes that never change."""
 
         def living(start: float, end: float) -> Iterator[Block]:
             for block in between(start, end):

@@ -1,9 +1,10 @@
 """Dead bands: outputs that the device sets to zero as long as they are small.
 
-An output of a triad has a dead band d if it is zero often, has no other value below d,
-and has values right beyond d. The last part tells a band from a grid, whose second step
-is at 2 d. A mean of less than 2 d is off by d / sqrt(3) or less, whatever part of its
-samples was set to zero.
+An output has a dead band d, m/s^2 or rad/s, if it is often zero, has no other value
+below d in size, and has values just above d. The last condition distinguishes a dead
+band from rounding to a grid of step d, whose next value is 2 d. A mean of less than 2 d
+has a standard error of at most d / sqrt(3), whatever part of its samples was set to
+zero.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ MIN_SAMPLES = 2
 """Fewest zeros of a dead band, and fewest values right beyond it."""
 
 BEYOND = (1.1, 1.9)
-"""Where values right beyond a band lie, in units of d: a grid of step d has none, even
-if its values are rounded a little."""
+"""Range of the values just above a dead band, in units of d. A grid of step d has no
+values there, even with small rounding errors of its own."""
 
 
 def dead_bands(block: Block) -> Array:

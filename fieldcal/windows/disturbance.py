@@ -7,12 +7,12 @@ noise of module `quiet`, l_i a robust straight line through y.
     step     z_k,i = |u_k,i+2^k - u_k,i| / (sqrt(2) a_k)                         (2)
     shake    z_k,i = sqrt(2^k) (mean of 2^k of q^(1/3) - median) / spread        (3)
 
-The line removes the slow drift of a device that warms up, which increases the error of
-the mean but is no disturbance. A step tilts the line and may not show in (1), but it
-does in (2), where y is without its drift if a line describes it better than a step. A
-vibration after which the device is where it was shows in the short-lag noise q of the
-cells, whose cube root is nearly normal (Wilson and Hilferty 1931). A channel may also
-be stuck at one value.
+The line l removes the slow drift of a device that warms up, which increases the error
+of the mean but is no disturbance. A step tilts the line and may not show in (1), but it
+shows in (2). There the drift is subtracted from y only in sections that a line
+describes better than a step. A vibration that does not move the device permanently
+shows in the short-lag noise q of the cells, whose cube root is nearly normal (Wilson
+and Hilferty 1931). Runs in which a channel repeats one value are found too.
 """
 
 from __future__ import annotations
@@ -33,10 +33,12 @@ SHAKE_LEVELS = 4
 """Durations looked for in the short-lag noise: 0.1 s to 0.8 s."""
 
 _HEAVY = 1.3
-"""Widening for short-lag noise of a low-passed sensor, whose tail is heavier."""
+"""Factor of the spread for low-passed sensors, whose short-lag noise has heavier
+tails."""
 
 STUCK_CELLS, STUCK_VALUES = 10, 20
-"""Cells and values of a run that noise of a step of the resolution never repeats."""
+"""Fewest cells and values of a run of one value that noise of one step of the
+resolution does not make."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +48,7 @@ class DisturbanceStatistic:
     Attributes
     ----------
     kind : kind of disturbance
-    cells : its duration
+    cells : its duration, 2^k cells
     size : (n, c) measured departure, SI
     noise : (c,) its standard deviation by noise, SI
     z : (n, c) departure over spread, (1) to (3)
@@ -67,7 +69,7 @@ class LeastSpread:
     Attributes
     ----------
     always : (c,) of means over any duration, SI
-    sampled : (c,) of one sample, SI: less the longer the duration
+    sampled : (c,) of one sample, SI; for a mean it is divided by the root of the number
     number : (c,) samples in a cell
 
     """
@@ -175,6 +177,6 @@ def repeats(
 
 
 def _zero_as_inf(spread: Array, least: Array) -> Array:
-    """Spread, infinite where there is none: what never varies cannot be judged."""
+    """Spread, at least `least`; infinite, so that nothing is found, where it is 0."""
     bounded = np.maximum(spread, least)
     return np.where(bounded > 0, bounded, np.inf)

@@ -1,8 +1,9 @@
 """Rounding of the outputs as the device states it, and the error of a mean from it.
 
-The error of a mean of values rounded to a step q is that of `rounding`. Values that are
-rounded toward zero, and then shifted to the middle of their interval, k + sign(k)/2 and
-0, have a further error around zero, where the interval is two steps wide:
+For values rounded to the nearest multiple of a step q, the error of a mean is that of
+`rounding`. For values that are rounded toward zero to k steps, and then shifted to the
+middle of their interval, k + sign(k)/2 or 0, there is a further error d around zero,
+where the interval is two steps wide:
 
     d(x) = -1/2 for 0 < x < 1, 1/2 for -1 < x < 0, 0 elsewhere                   (1)
     D(v, s) = E d(v + s n) = (2 P(0) - P(1) - P(-1)) / 2,  P(a) = Phi((a - v)/s) (2)
@@ -29,10 +30,10 @@ MEAN_OFFSETS = np.linspace(-1.0, 1.0, 21)
 """Possible differences of the true mean from the mean of the values, steps."""
 
 LEAST_NOISE = 1e-3
-"""Least noise, steps: an output without noise is always on the same side of an edge."""
+"""Least noise in (2), steps, so that it is not divided by zero."""
 
 AROUND_ZERO = 2.0
-"""Means below this are around zero, steps."""
+"""Size of a mean below which it is around zero, steps."""
 
 STEPS_HIDDEN_NOISE = 1.5
 """Noise, in steps, below which single steps show around zero."""

@@ -1,13 +1,14 @@
-"""Positions of a recording without turns: its rows jump from one rest to the next.
+"""Positions of a recording that contains no turns, only jumps from rest to rest.
 
     d_i = |median(x_i .. x_(i+4)) - median(x_(i-5) .. x_(i-1))| > 8 s               (1)
 
-s is the noise of a row. A single outlier does not change a median. At a jump between
-two rows (1) is true at five rows, or at six with an outlier next to it; at a recorded
-turn it is true at more. In a rest the first and the last median differ by less than a
-jump, and its rows scatter as much as those of other rests, which a moving device does
-not. Such a recording results if the operator presses a key at each position and a
-hundred rows are then taken.
+x_i are the rows of an accelerometer, and s is the noise of a row, m/s^2. A single
+outlier does not change a median. At a jump between two rows (1) is true at five rows,
+or at six with an outlier next to it; at a recorded turn it is true at more rows. In a
+rest the first and the last median differ by less than a jump, and the rows have the
+same scatter as in other rests; neither holds for a moving device. Such a recording
+results if the operator presses a key at each position, and a hundred rows are taken at
+each key.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ MEDIAN_ROWS = 5
 """Rows of a median in (1)."""
 
 JUMP_OVER_NOISE = 8.0
-"""Times the noise of a row that a jump is at least."""
+"""Least jump, in units of the noise of a row."""
 
 FEWEST_ROWS, FEWEST_POSITIONS = 20, 3
 """Fewest rows of a position, and fewest positions, of such a recording."""

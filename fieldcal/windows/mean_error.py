@@ -35,13 +35,13 @@ BAND = 2.5
 """Highest frequency the noise at f = 0 is estimated from, Hz."""
 
 _FEWEST = 8
-"""Frequencies that are used even when they reach beyond the band."""
+"""Least number of frequencies that are used, even if they are above `BAND`."""
 
 _LINE = 8.0
-"""Power over that of its neighbours at which a frequency is a line, not noise."""
+"""Ratio of power to that of the neighbours above which a frequency is a line."""
 
-_BESIDE = 10
-"""Neighbours to either side."""
+_NEIGHBOURS = 10
+"""Number of neighbouring frequencies on each side."""
 
 CORNERS = (np.inf, 2.4, 1.2, 0.6, 0.3, 0.15)
 KNEES = (0.0, 0.02, 0.06, 0.2, 0.6, 2.0, 6.0)
@@ -113,15 +113,16 @@ def fourier_sums(means: Array, spacing: float) -> tuple[Array, Array]:
 
 
 def without_lines(power: Array) -> Array:
-    """Power (n, c) with lines cut down to the most that noise shows beside them.
+    """Power (n, c) in which lines are limited to a multiple of the power around them.
 
-    Hum and sway average out and must not pass for noise. The lowest frequencies stay
-    as they are: a drift is no line.
+    Hum and sway average out and must not count as noise. The lowest four frequencies
+    are not changed, since a drift is no line.
     """
-    if len(power) <= 2 * _BESIDE:
+    if len(power) <= 2 * _NEIGHBOURS:
         return power
-    around = np.pad(power, ((_BESIDE, _BESIDE), (0, 0)), mode="reflect")
-    local = np.lib.stride_tricks.sliding_window_view(around, 2 * _BESIDE + 1, axis=0)
+    width = 2 * _NEIGHBOURS + 1
+    padded = np.pad(power, ((width // 2, width // 2), (0, 0)), mode="reflect")
+    local = np.lib.stride_tricks.sliding_window_view(padded, width, axis=0)
     cut: Array = np.minimum(power, _LINE / np.log(2) * np.median(local, axis=-1))
     cut[:4] = power[:4]
     return cut

@@ -4,14 +4,15 @@ With means over m consecutive samples, the Hadamard variance times m,
 
     s^2(m) = m <(mean_{k+2} - 2 mean_{k+1} + mean_k)^2> / 6                      (1)
 
-is the variance of one sample for white noise, for any m and any linear drift. The
-result is the level that a mean over a second obeys. Shorter m are included if they
-agree with it, so that filtered or otherwise coloured outputs do not appear quieter. The
-mean of squares leaves out the largest tenth, and with it short disturbances. Biases
+is the variance of one sample for white noise, for any m and any linear drift. The white
+noise is the level at m of one second. Levels at shorter m, which are more precise,
+replace it as long as they agree with it; thus filtered or otherwise coloured outputs do
+not appear quieter. The largest tenth of the squares is left out of their mean, and with
+it short disturbances. Biases
 with a random walk of q sqrt(t) add a term in m^2; if the levels rise like that, the
 white noise is the level without this term. At m = 1 the level is that of the fastest
-noise. To compare the noise of windows, long vibration must not be left out; there the
-short-lag noise is
+noise. To compare the noise of windows, long vibration must be included; for that
+purpose the short-lag noise is
 
     s^2 = <(x_{k+1} - x_k)^2> / 2                                                (2)
 
@@ -39,7 +40,8 @@ from fieldcal.windows.sums import smallest_changes
 
 KEEP = 0.9
 CENTRAL_SECOND_MOMENT = 0.62302
-"""Second moment of a unit normal inside its central nine tenths."""
+"""Part of the squares that is kept, and second moment of the central nine tenths of a
+unit normal."""
 
 MOST_DIFFERENCES = 200_000
 """Most differences that are used: they give a level to a third of a percent."""
@@ -48,11 +50,12 @@ STEP_SAMPLES = 2000
 """Samples of a window from which the step of coarse outputs is taken."""
 
 RISES, FALLS = 2.0, 2.0
-"""Factors by which the maximum of s^2(m) exceeds its first and its last value where a
-motion goes to and fro."""
+"""Least ratios of the maximum of s^2(m) to its first and its last value for a motion to
+and fro."""
 
 AGREE = 3.0
 ANCHOR_S = 1.0
+"""Standard errors within which levels agree, and the longest means, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +64,8 @@ class ChannelNoise:
 
     Attributes
     ----------
-    white : white noise that means over a second obey
-    quick : noise from one sample to the next
+    white : white noise, from means over a second and shorter ones that agree
+    quick : noise from one sample to the next, (1) at m = 1
 
     """
 
@@ -139,8 +142,9 @@ def short_lag_noise(values: Array) -> Array:
 
 def smallest_steps(pieces: Sequence[Array]) -> Array:
     """Smallest change of each channel from one sample to the next, (c,); 0 if none."""
-    each = [_least_change(p[:STEP_SAMPLES]) for p in pieces if len(p) > 1]
-    least: Array = np.min(each, axis=0) if each else np.full(pieces[0].shape[1], np.inf)
+    changes = [_least_change(p[:STEP_SAMPLES]) for p in pieces if len(p) > 1]
+    none = np.full(pieces[0].shape[1], np.inf)
+    least: Array = np.min(changes, axis=0) if changes else none
     return np.where(np.isfinite(least), least, 0.0)
 
 
@@ -182,10 +186,10 @@ def _second_differences(piece: Array, m: int, most: int) -> Array:
 def _means(rows: Array) -> Array:
     """Means (n, c) of m samples each, (n, m, c)."""
     n, m, channels = rows.shape
-    each = np.full(m, 1 / m)
-    means = rows.reshape(n, -1) @ np.kron(each[:, None], np.eye(channels))
-    # that is much faster than a product for each row, but spreads what is missing
-    return np.asarray(each @ rows if np.isnan(means).any() else means)
+    weights = np.full(m, 1 / m)
+    means = rows.reshape(n, -1) @ np.kron(weights[:, None], np.eye(channels))
+    # one large product is much faster, but a nan in it spreads to all channels
+    return np.asarray(weights @ rows if np.isnan(means).any() else means)
 
 
 def _agreed_level(lengths: Sequence[int], levels: Array, spreads: Array) -> float:

@@ -7,7 +7,7 @@ if the device has the same attitude afterwards. Pieces agree if their means do,
 
 with the standard errors s and t of the pieces. They are then one window, whose mean and
 error are those of all cells. If they do not agree, the earlier pieces are discarded,
-since a mean over two attitudes is wrong for both.
+since a mean over two attitudes belongs to neither. Units: SI.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@
     a_k^2 = A / 2^k + B                    beyond the longest level measured     (2)
     s_k^2 = sum over j >= k of a_j^2 / 2                                         (3)
 
-(1) is a robust Allan deviation. Only few of the differences contain the edge of a step
-or a push, so it is the noise of the device also in a disturbed window. For the longest
+(1) is a robust Allan deviation. Few of the differences contain the edge of a step or a
+push, so (1) measures the noise of the device in a disturbed window too. For the longest
 levels a window has too few differences; (2) extrapolates with white noise and flicker.
 (3) is the spread of u_k about the mean for any stationary noise (Haar analysis of
 variance); for white noise s_k = a_k.
@@ -27,7 +27,7 @@ LEVELS = 8
 """Durations: 0.1 s to 12.8 s, each twice the one before."""
 
 KNEE = 0.05
-"""Knee of the flicker that any device may have, unseen in a short window, Hz."""
+"""Knee of the least flicker that is assumed, Hz: a short window does not show it."""
 
 _MORE = 2.0
 """Largest factor by which noise may grow from one window to the next."""

@@ -1,11 +1,11 @@
 """Which cells of a recording are at rest, on a table or in a hand.
 
-    r_i = max over channels of sd(y over 1 s about i) / quietest tenth of them     (1)
+    s_i = sd(y over 1 s about i),   r_i = max over channels of s_i / s_low         (1)
 
-y are cell means. log r has two clusters, rest and turns, which are split by a threshold
-(Otsu 1979). Each run of cells below it is then compared with its own noise and with the
-gyroscopes' level at rest. A run ends at a pause of the recording, since the device may
-move during it.
+y are the means of cells i, and s_low is the lower decile of s over the recording. log r
+has two clusters, rest and turns, which are split by a threshold (Otsu 1979). Each run
+of cells below it is then compared with its own noise and with the gyroscopes' level at
+rest. A run ends at a pause of the recording, since the device may move during it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ _OWN = 4.0
 """Largest spread within a stretch, in multiples of its usual one."""
 
 _FLIPS = 0.6
-"""Spread of cell means, in steps of a coarse output, when it flips between two."""
+"""Spread of the cell means of a coarse output that changes between two values,
+steps."""
 
 _LONGEST = 36_000
 """Cells of the longest run, an hour: a longer rest is evaluated in several parts."""
@@ -211,6 +212,6 @@ def _splitting_threshold(ratio: Array) -> float:
     n = np.arange(1, len(logs))
     below = np.cumsum(logs)[:-1] / n
     above = (logs.sum() - n * below) / (len(logs) - n)
-    between = n * (len(logs) - n) * (above - below) ** 2
-    k = int(np.argmax(between))
+    between_clusters = n * (len(logs) - n) * (above - below) ** 2
+    k = int(np.argmax(between_clusters))
     return float(np.exp((below[k] + above[k]) / 2))

@@ -6,9 +6,10 @@ biases of the accelerometers. Measured are
 
     d = mean f after - mean f before = f x theta + b + e,   phi = theta + e'        (1)
 
-phi is the integral of the gyroscopes over the gap, less their mean beside it. Either
-theta is 0, or it is random, N(0, TYPICAL_ROTATION^2); and b is 0, or with a small
-probability a jump, N(0, TYPICAL_JUMP^2). By Bayes' rule over these four cases
+phi is the integral of the gyroscopes over the gap, less their mean rate in both
+stretches. Either theta is 0, or it is random, N(0, TYPICAL_ROTATION^2); and either b is
+0, or, with a small probability, it is a jump, N(0, TYPICAL_JUMP^2). By Bayes' rule over
+these four cases
 
     P(as before) = sum over b of P(b) N(d, phi | theta = 0, b) / sum over all       (2)
 
@@ -19,8 +20,8 @@ Means over T s, g s apart, of noise of the Allan deviation a(T) differ by
 
 and by v (T + g), v their common slope, which counts as an uncertainty of its own size.
 T is chosen so that the sum is least. B is that of flicker, and too large for white
-noise. The sum of the n samples in the gap has the errors of their fast part (noise, or
-a swing that they do not resolve) and of the mean beside it:
+noise. The integral over the n samples in the gap has the errors of their fast part
+(noise, or a swing that they do not resolve) and of the mean rate in both stretches:
 
     var e' = n dt^2 q + g^2 (var e_w / 4 + d_w^2 / 12) + (s^2 / 2)^2,               (4)
     q = mean of (k-th differences of w)^2 / (2k over k),   k = 4 if there are so many
@@ -175,15 +176,15 @@ def _is_untouched(before: CellTable, way: Block, after: CellTable) -> bool:
     last_level = before.origin + fill_with_previous(before.means)[
         -CELLS_BESIDE_GAP:
     ].mean(axis=0)
-    other = after.origin + fill_with_previous(after.means)[:CELLS_BESIDE_GAP].mean(
+    next_level = after.origin + fill_with_previous(after.means)[:CELLS_BESIDE_GAP].mean(
         axis=0
     )
-    known = np.isfinite(last_level + other + noise) & (noise > 0)
+    known = np.isfinite(last_level + next_level + noise) & (noise > 0)
     six = way.six[:, known]
     if not np.isfinite(six).all():
         return False
     early, late = (np.cumsum((np.square(six - level[known]) / noise[known]).sum(axis=1))
-                   for level in (last_level, other))  # fmt: skip
+                   for level in (last_level, next_level))  # fmt: skip
     early, late = np.append(0.0, early), np.append(0.0, late)
     least = float((early + late[-1] - late).min())
     return chi2_tail(least, six.size) > NOISE_PROBABILITY
@@ -212,11 +213,11 @@ def probability_unmoved(
     level, change, spread = _compare_means(before, after, gap[1] - gap[0])
     inside = way.between(*gap)
     turned, unsure, most = _turn_in_gap(inside, level[3:], change[3:], spread[3:])
-    if np.isnan(most):  # gravity leans as far as the device
+    if np.isnan(most):  # without gyroscopes, the angle of gravity in device axes
         most = _largest_angle(inside, level[:3])
     # a turn that is not recorded shows in the force alone
-    leans = float(np.linalg.norm(change[:3]) / np.linalg.norm(level[:3]))
-    if not np.fmax(most, leans) < LARGEST_ANGLE:
+    force_angle = float(np.linalg.norm(change[:3]) / np.linalg.norm(level[:3]))
+    if not np.fmax(most, force_angle) < LARGEST_ANGLE:
         return 0.0
     change_and_turn = np.concatenate([change[:3], turned])
     noise = np.concatenate([spread[:3], unsure])
@@ -265,13 +266,13 @@ def _compare_means(
     comparisons = []
     for k, a in enumerate(allan[: fewest.bit_length()]):
         n = 2**k
-        apart = gap + n * CELL
+        distance = gap + n * CELL  # of the middles of both means
         drift = (
             _slope(right[: SLOPE_STRETCH * n]) - _slope(left[: SLOPE_STRETCH * n])
         ) / 2
         spread = 2 * a**2 * flicker_bias_function(1 + gap / (n * CELL))  # (3)
         means = left[:n].mean(axis=0), right[:n].mean(axis=0)
-        comparisons.append((*means, spread + (drift * apart) ** 2))
+        comparisons.append((*means, spread + (drift * distance) ** 2))
     table = np.array(comparisons)
     best = np.argmin(table[:, 2], axis=0)
     mean, other, spread = table[best, :, np.arange(6)].T
@@ -343,7 +344,7 @@ def _cross_matrix(v: Array) -> Array:
 def _log_density(
     difference: Array, covariance: Array, known: NDArray[np.bool_]
 ) -> float:
-    """Log of the normal density of the known ones among some values."""
+    """Log normal density of those elements of `difference` that are `known`."""
     part = covariance[np.ix_(known, known)]
     root = np.linalg.cholesky(part)
     white = np.linalg.solve(root, difference[known])

@@ -2,8 +2,8 @@
 
     |x_i - x_(i-1)|, |x_(i+1) - x_i| > 12 s,   |x_(i+1) - x_(i-1)| < 0.3 of both    (1)
 
-s is the typical difference of successive samples. The device has not moved by such a
-jump, so the search for rests ignores it.
+x_i are the samples of one channel, and s is the typical difference of successive
+samples. Such a jump is no motion of the device, so the search for rests ignores it.
 """
 
 from __future__ import annotations
@@ -16,21 +16,23 @@ from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Block
 
 WILD = 12.0
-"""Least jump, in usual differences; no noise reaches it."""
+"""Least jump, in typical differences; noise does not reach it."""
 
 BACK = 0.3
-"""Largest difference of the samples before and after it, as part of the jump."""
+"""Largest difference between the samples before and after the jump, as a part of it."""
 
 
 def without_spikes(block: Block) -> Block:
     """The block with nan in place of single samples that jump by (1)."""
-    acc, gyr = _limited_steps(block.acc), _limited_steps(block.gyr)
+    acc = _without_single_jumps(block.acc)
+    gyr = _without_single_jumps(block.gyr)
     if acc is block.acc and gyr is block.gyr:
         return block
     return replace(block, acc=acc, gyr=gyr)
 
 
-def _limited_steps(triad: Array) -> Array:
+def _without_single_jumps(triad: Array) -> Array:
+    """The samples (n, 3) with nan where (1) holds; the same array if it never does."""
     if len(triad) < len("abc"):
         return triad
     step = np.abs(np.diff(triad, axis=0))

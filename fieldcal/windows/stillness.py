@@ -8,12 +8,12 @@ Every 0.1 s the means y of the last 0.8 s of cells are looked at:
     w = mean rate less that of the last rest       constant rotation               (4)
 
 The device is at rest if d, e and w of every channel are explained by noise. The noise
-is the smallest tenth of a in the last 20 s. It is thus known from the first second on,
-it does not change by a turn, and a device that becomes noisier is at rest again after a
-while.
+is the lower decile of a in the last 20 s. It is thus known from the first second on,
+and a turn does not change it. A device that becomes noisier counts as at rest again
+when the 20 s have passed.
 
-On a base that sways this never happens. If the session states that the base sways, the
-device is at rest if oscillation and trend are within the limits of `limits`.
+On a base that sways, this test never finds rest. If the session states that the base
+sways, the device is at rest if the scatter of y is within the limits of `limits`.
 """
 
 from __future__ import annotations
@@ -43,14 +43,15 @@ BIAS_CELLS = 30
 """Cells after which a constant rate is a bias and not a turn by hand: 3 s."""
 
 _SMALLEST = 1.6
-"""Noise over the smallest tenth of its estimates (1) in 20 s."""
+"""Ratio of the noise to the lower decile of its estimates (1) in 20 s."""
 
 _UNKNOWN = 0.2
-"""Part of the limits that a device never seen at rest must stay within."""
+"""Part of the limits that applies until the device has been at rest once."""
 
 _TIME = np.arange(CELLS_TOGETHER) - (CELLS_TOGETHER - 1) / 2
 _SLOPE = CELLS_TOGETHER * _TIME / (_TIME @ _TIME)
-"""Slope times duration of SPAN values, as their weighted sum."""
+"""Times of the cells about their middle, in cells; and the weights of the cells whose
+sum is slope times duration, (3)."""
 
 
 class Stillness:
@@ -102,6 +103,7 @@ class Stillness:
                 self._judge(float(time))
 
     def _judge(self, time: float) -> None:
+        """Evaluate the last cells; `time` is the start of the last one, s."""
         y, short = (np.array(rows) for rows in zip(*self._recent, strict=True))
         self._noises.append(np.sqrt((np.diff(y, axis=0) ** 2).mean(axis=0) / 2))  # (1)
         noise = self._noise(np.sqrt(short.mean(axis=0)))
@@ -119,6 +121,7 @@ class Stillness:
             self._rest = y[:, 3:].mean(axis=0)
 
     def _noise(self, sampled: Array) -> Array:
+        """Noise of a cell mean, (6,); `sampled` is the short-lag noise, (6,)."""
         smallest = _SMALLEST * np.quantile(self._noises, 0.1, axis=0)
         noise: Array = np.maximum(
             smallest, visible_steps(resolution(self._finest), sampled)

@@ -21,10 +21,10 @@ MIN_PAUSE_S = 1.0
 """Time without a cell that is a pause, s."""
 
 TURNS = 0.02
-"""Difference of a rate that is a rotation, rad/s."""
+"""Difference of a rate from that in the stretch that is a rotation, rad/s."""
 
 DEPARTURE_SPREADS = 4.0
-"""Spreads of a stretch's own means that are a departure."""
+"""Least departure from a stretch, in standard deviations of its cell means."""
 
 
 def stretch_end_reasons(

@@ -25,7 +25,8 @@ from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.verdict import judge_window
 
 MIN_STRETCHES = 3
-"""Number of stretches below which rests may be too short for the usual margin."""
+"""Number of stretches below which the rests may be too short to omit half a second at
+each end."""
 
 SEAM_S = 2 * CELL
 """Largest gap between two parts of one rest that are evaluated separately, s."""
@@ -64,7 +65,7 @@ def still_stretches_of_file(
     Parameters
     ----------
     rows : of all of it
-    origin : (6,) what their sums are taken about
+    origin : (6,) reference of their sums
     between : gives the samples of a stretch of it
     min_seconds : as in `still_stretches`
 

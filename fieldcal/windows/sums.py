@@ -41,7 +41,7 @@ def _sums_of_all(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
 
 
 def _sums_of_known(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
-    """n, S, D, m of cells, (m, 4, c), of the values of c channels that are there."""
+    """n, S, D, m of cells, (m, 4, c), of c channels, without missing values."""
     known, moved = np.isfinite(x), np.isfinite(step)
     squares = np.where(moved, step, 0.0) ** 2
     rows = np.vstack([known, np.where(known, x, 0.0), squares, moved])

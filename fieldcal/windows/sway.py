@@ -7,8 +7,9 @@ at rest and the arm r from the centre of rotation, the device measures
     f - f0 = f0 x phi + phi x (phi x f0) / 2 + w' x r + w x (w x r)              (1)
     w      = phi' - phi x phi' / 2                                               (2)
 
-The first terms are waves; their mean over a window depends only on its ends. The mean
-of the other terms is not zero: phi^2 / 2 of gravity, and a coning rate. The waves are
+The terms that are linear in phi are waves; their mean over a window depends only on its
+ends. The mean of the terms of second order is not zero: phi^2 / 2 of gravity, and a
+coning rate. The waves are
 those of `sway_process`; the squares in (1) and (2) use the waves that the gyroscopes
 measure.
 

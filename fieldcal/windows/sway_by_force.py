@@ -5,10 +5,10 @@ and the accelerometers across it show
 
     phi = -f0 x (f - f0) / f0^2                                                    (1)
 
-A push to and fro looks the same: a ship surges as it rolls. Both are waves, which are
-taken out alike. Only their squares differ, the mean of which is phi^2 / 2 of gravity
-where the base turns about a centre near the device, and nothing where it is pushed.
-They are taken for those of a turn, and are as uncertain as they are large.
+A linear oscillation looks the same: a ship surges as it rolls. Both are waves and are
+subtracted in the same way. Only their terms of second order differ: their mean is
+phi^2 / 2 of gravity if the base turns about a centre near the device, and zero if it
+moves linearly. The value for a rotation is used, with an uncertainty of the same size.
 
 Source: rotation kinematics to second order.
 """

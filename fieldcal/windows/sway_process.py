@@ -4,9 +4,9 @@
     a, b ~ N(0, v_k),   s = |f0| of accelerometers, w_k of gyroscopes            (1)
 
 at frequencies half a cycle per window apart, and at those of the strongest lines. v_k
-and the noise maximise the evidence: a swell is one line, gusts are many. The remaining
-uncertainty of m_c is its variance in addition to that of white noise. The drift q_c is
-that of a device, which is small beside that of a wave of which a part is missing.
+and the noise maximise the evidence: a swell is one line, gusts are many. The waves add
+a variance to that of m_c by white noise. The drift q_c is that of the biases, which is
+small compared to the slope of a wave of less than a period.
 
 Source: MacKay 1992, Tipping 2001.
 """
@@ -97,17 +97,19 @@ class _WaveProcess:
         v = (power[at] + power[at + count]).mean(axis=1) / 2
         for _ in range(MAX_ROUNDS):
             columns = np.concatenate([at, at + count])
-            every, half = np.append(columns, 2 * count), len(at)
+            with_drift, half = np.append(columns, 2 * count), len(at)
             wide = np.sqrt(np.tile(v[at], 2))[:, None] * self.size[columns]
             wide = np.vstack([wide, self.drift])
-            mean, cov = _posterior(gram[np.ix_(every, every)], pull[every], wide, noise)
+            mean, cov = _posterior(
+                gram[np.ix_(with_drift, with_drift)], pull[with_drift], wide, noise
+            )
             known = np.clip(1 - np.einsum("ckk->kc", cov) / wide**2, 1e-12, 1.0)
             share = [
                 (x[:half] + x[half:]).sum(axis=1)
                 for x in ((mean[:-1] / self.size[columns]) ** 2, known[:-1])
             ]
             v[at] = share[0] / share[1]
-            rest = self.off - self.free[:, every] @ mean
+            rest = self.off - self.free[:, with_drift] @ mean
             spare = np.maximum(self.count - 1 - known.sum(axis=0), 1.0)
             noise = np.maximum((rest**2).sum(axis=0) / spare, 1e-30)
             loud = (
@@ -117,15 +119,17 @@ class _WaveProcess:
             if not loud.any():
                 return None
             kept = loud.any(axis=1)
-            some = np.append(np.tile(kept, 2), True)
-            mean, cov = mean[some], cov[:, some][:, :, some]
+            rows = np.append(np.tile(kept, 2), True)
+            mean, cov = mean[rows], cov[:, rows][:, :, rows]
             at = at[kept]
-        off = self.table[:, np.concatenate([at, at + count, [2 * count]])].mean(axis=0)
-        left = np.einsum("i,cij,j->c", off, cov, off)
+        mean_of_waves = self.table[
+            :, np.concatenate([at, at + count, [2 * count]])
+        ].mean(axis=0)
+        excess = np.einsum("i,cij,j->c", mean_of_waves, cov, mean_of_waves)
         half = len(at)
         return replace(
             self.known, hz=self.hz[at], cos=mean[:half], sin=mean[half:-1],
-            excess_variance=left, noise=noise,
+            excess_variance=excess, noise=noise,
         )  # fmt: skip
 
 
@@ -173,8 +177,8 @@ def _with_lines(hz: Array, lines: Array, near: float) -> Array:
     for line in lines.tolist():
         if all(abs(line - other) > near for other in kept):
             kept.append(line)
-    apart = np.abs(np.subtract.outer(hz, np.array(kept))).min(axis=1) > near
-    return np.sort(np.concatenate([hz[apart], kept]))
+    distant = np.abs(np.subtract.outer(hz, np.array(kept))).min(axis=1) > near
+    return np.sort(np.concatenate([hz[distant], kept]))
 
 
 def _line_frequencies(t: Array, y: Array, hz: Array) -> Array:

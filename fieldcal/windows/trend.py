@@ -11,12 +11,12 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 _PIECES = 12
-"""Pieces of a window through whose medians the line is drawn."""
-
+"""Number of pieces of a section; the line is fitted to their medians."""
 
 SECTION = 1200
-"""Cells of a section at most: two minutes, in which a device that settles within
-minutes is a few hundredths of its drift from a straight line."""
+"""Largest number of cells in a section: two minutes. Over that time, the bias of a
+device that settles within minutes departs from a straight line by a few hundredths of
+its drift."""
 
 
 def robust_lines(values: Array, step: Array | None = None) -> Array:

@@ -1,4 +1,9 @@
-"""Whether the device moved during a window: when, on which axis and how."""
+"""Test of a window for rest: whether the device moved, when, on which axis and how.
+
+The statistics of module `disturbance`, the drift over the window and its noise are each
+compared with what is allowed; the largest ratio decides. Cells are 0.1 s of device
+time; c channels in `CHANNELS` order, SI.
+"""
 
 from __future__ import annotations
 
@@ -24,35 +29,38 @@ from fieldcal.windows.quiet import QuietNoise, estimate_quiet_noise
 from fieldcal.windows.rounding import largest_deviation, variance_of_mean
 from fieldcal.windows.trend import drift_course, robust_lines
 
-THRESHOLD, LONG = 5.8, 600
-"""Ratio of departure to spread that noise alone does not reach, in a window of `LONG`
-cells, a minute."""
+THRESHOLD, THRESHOLD_CELLS = 5.8, 600
+"""Ratio of departure to its standard deviation that noise alone does not reach, in a
+window of `THRESHOLD_CELLS` cells: a minute."""
 
 FEWEST_JUDGED_CELLS = 30
-"""Cells from which the usual noise of a window is known: 3 s, or as many samples where
-they come less often than cells."""
+"""Number of cells from which a window is tested, since its noise is known: 3 s, or as
+many samples if samples come less often than cells."""
 
 EARLY_WINDOW_S = 8.0
-"""The threshold is twice as high in a window this long, s, for lack of data."""
+"""Length of the windows so far, s, at which the threshold is doubled because their
+noise is uncertain. The addition falls with the square of the length."""
 
 MEAN_ROUNDING = 1e-6
-"""Relative error of a mean of equal values, of which a jump of one step consists."""
+"""Relative numerical error of a mean of equal values. A jump of one step of the output
+is a difference of two such means, and must not exceed the bound by this error."""
 
-_PRESENT = 10
-"""Cells of the last second."""
+_LAST_SECOND = 10
+"""Number of cells in the last second."""
 
 
 @dataclass(frozen=True, slots=True)
 class Departure:
-    """Where and by how much a window departs most from rest.
+    """A departure of a window from rest: kind, channel, time and size.
 
     Attributes
     ----------
-    ratio : departure over the allowed one; above 1 is a disturbance
+    ratio : departure over the allowed departure; above 1 it is a disturbance
     kind : kind of disturbance
     channel : index in `CHANNELS`
-    at, seconds : start, s of device time, and duration, s
-    size, noise : departure and its standard deviation by noise, SI
+    at, seconds : its start, s of device time, and its duration, s
+    size, noise : departure, and its standard deviation by noise alone, SI; of "noise",
+        the standard deviation of the cell means and its limit
 
     """
 
@@ -94,8 +102,9 @@ class WindowVerdict:
     Attributes
     ----------
     worst : the largest departure so far
-    ratio_now : the largest ratio of the last second
-    quiet : the noise, for the window that follows
+    ratio_now : the largest ratio within the last second
+    quiet : noise of the device at rest, for the test of the next window; None as long
+        as it is not known
 
     """
 
@@ -112,8 +121,14 @@ def judge_window(
 ) -> WindowVerdict:
     """Test the samples so far for rest, by their noise and that of earlier windows.
 
-    `visible_steps` (6,) are the jumps by rounding alone, where the device states its
-    rounding.
+    Parameters
+    ----------
+    cells : of the window so far
+    limits : bounds of noise and drift of any device at rest
+    before : noise of the device in earlier windows; None if there were none
+    visible_steps : (6,) largest jump by rounding alone, SI, if the device states its
+        rounding
+
     """
     m = cells.complete_count
     if m < FEWEST_JUDGED_CELLS or m * cells.period < limits.unjudged_s:
@@ -134,25 +149,28 @@ def judge_window(
     tests = _disturbance_statistics(
         cells, means, lines, noise, _least_spreads(cells, least)
     )
-    worst = [_worst_departure(cells, test, allowed) for test in tests] + _stuck_runs(
-        cells
-    )
-    worst.append(_drift_departure(cells, lines, noise, limits))
-    worst.append(_noise_departure(cells, noise.spread[0], limits))
-    recent = [test.z[-_PRESENT:].max() for test in tests if test.cells < _PRESENT]
+    departures = [
+        *(_worst_departure(cells, test, allowed) for test in tests),
+        *_stuck_runs(cells),
+        _drift_departure(cells, lines, noise, limits),
+        _noise_departure(cells, noise.spread[0], limits),
+    ]
+    recent = [
+        test.z[-_LAST_SECOND:].max() for test in tests if test.cells < _LAST_SECOND
+    ]
     return WindowVerdict(
-        max(worst, key=lambda departure: departure.ratio),
+        max(departures, key=lambda departure: departure.ratio),
         float(max(recent) / allowed),
         noise,
     )
 
 
 def _threshold(cells: int) -> float:
-    """`THRESHOLD`, raised for a window of more cells than `LONG`.
+    """`THRESHOLD`, raised for a window of more than `THRESHOLD_CELLS` cells.
 
     The largest of n normal deviates grows as sqrt(2 ln n).
     """
-    return float(np.sqrt(THRESHOLD**2 + 2 * np.log(max(1.0, cells / LONG))))
+    return float(np.sqrt(THRESHOLD**2 + 2 * np.log(max(1.0, cells / THRESHOLD_CELLS))))
 
 
 def _disturbance_statistics(
@@ -169,32 +187,36 @@ def _disturbance_statistics(
 
 
 def _rounding_noise(cells: CellTable) -> Array:
-    """Error of a mean by rounding, where noise does not average it out, (6,)."""
+    """Standard error (6,) that rounding leaves in a mean of the window, SI."""
     return np.sqrt(variance_of_mean(cells.resolution, np.nan_to_num(cells.noise)))
 
 
 def _least_spreads(cells: CellTable, always: Array) -> LeastSpread:
-    """Lower bounds of the spreads, from `always` and from how often values change.
+    """Lower bounds of the spreads, from `always` (6,), SI, and from how values change.
 
-    A cell in which a value jumps by many steps counts as one with changes throughout.
+    The mean square of the changes in a cell, in steps, is taken for the share of
+    samples that change by one step, and is limited to 1.
     """
-    step, differ = cells.resolution, cells.step_counts
+    step, number = cells.resolution, cells.step_counts
     unit = np.where(step > 0, step, np.inf) ** 2
     share = np.minimum(2 * np.nan_to_num(cells.short_lag_variance) / unit, 1.0)
-    changed = (share * differ).sum(axis=0) / np.maximum(differ.sum(axis=0), 1.0)
+    changed = (share * number).sum(axis=0) / np.maximum(number.sum(axis=0), 1.0)
     return LeastSpread(
         always, largest_deviation(step, changed), _samples_per_cell(cells)
     )
 
 
 def _samples_per_cell(cells: CellTable) -> Array:
-    """Samples that a cell usually has, (6,)."""
+    """Median number of samples in a cell, (6,)."""
     number: Array = np.median(cells.counts, axis=0)
     return number
 
 
 def _stuck_runs(cells: CellTable) -> list[Departure]:
-    """Runs of one value, where the axes of a sensor are noisier than its resolution."""
+    """Runs in which a channel repeats one value although it has noise.
+
+    It has noise if its own, or the median of its sensor, exceeds the resolution.
+    """
     sampled = np.nan_to_num(cells.noise)
     sensor = np.repeat(np.median(sampled.reshape(2, 3), axis=1), 3)
     noisy = np.flatnonzero(np.maximum(sampled, sensor) > cells.resolution)
@@ -216,6 +238,7 @@ def _stuck_runs(cells: CellTable) -> list[Departure]:
 def _worst_departure(
     cells: CellTable, test: DisturbanceStatistic, allowed: float
 ) -> Departure:
+    """Largest departure of one statistic, with the `allowed` ratio z."""
     first, channel = divmod(int(np.argmax(test.z)), test.z.shape[1])
     cell = first + test.cells if test.kind == "step" else first
     return Departure(
@@ -232,7 +255,7 @@ def _worst_departure(
 def _drift_departure(
     cells: CellTable, lines: Array, noise: QuietNoise, limits: StillnessLimits
 ) -> Departure:
-    """Change of the line over the window, against the limit and the noise."""
+    """Change of the robust line `lines` (m, 6) over the window, by limit and noise."""
     change = lines[-1] - lines[0]
     ratio = np.abs(change) / (limits.drift + THRESHOLD * noise.allan[-1])
     channel = int(np.argmax(ratio))
@@ -250,6 +273,7 @@ def _drift_departure(
 def _noise_departure(
     cells: CellTable, scatter: Array, limits: StillnessLimits
 ) -> Departure:
+    """Standard deviation of the cell means, `scatter` (6,), against its limit."""
     ratio = scatter / limits.noise
     channel = int(np.argmax(ratio))
     means = np.abs(np.nan_to_num(cells.means[:, channel]))

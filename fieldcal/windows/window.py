@@ -1,13 +1,13 @@
 """A window while it fills: mean, its error and the test for rest after every block.
 
 If a device rotates slightly at rest, in a hand or on a support that gives way, its
-specific force changes across the mean force and not along it. The noise of the mean
-along n = f / |f| is then lower than the noise of the axes suggests, and the covariance
-C of the axes is changed accordingly:
+specific force f changes across its mean and not along it. The noise of the mean along n
+= f / |f| is then lower than the covariance C of the axes states, and C is replaced by
 
     C' = C - C n n^T C (1 / q - v / q^2),   q = n^T C n                          (1)
 
-with v the variance of the mean of n . f by the spectrum of n . f; then n^T C' n = v.
+where v is the variance of the mean of n . f by the spectrum of n . f; with it n^T C' n
+is v. Units: m/s^2 and rad/s.
 """
 
 from __future__ import annotations

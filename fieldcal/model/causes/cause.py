@@ -14,7 +14,7 @@ from fieldcal.physics.effect import Effect
 
 Basis = Course | General
 Point = tuple[Mapping[str, float], int]
-"""Values of an effect's shape parameters, and the origin of its times."""
+"""Values of an effect's shape parameters, and the index of the origin of its times."""
 
 MIN_WINDOWS = 3
 """Number of windows below which their offsets are not separable from the bias."""
@@ -28,8 +28,8 @@ BOTH = frozenset({"acc", "gyr"})
 """Accelerometers and gyroscopes."""
 
 MAX_OFFERED_COLUMNS = 60
-"""Largest number of columns used to predict the worth of a group: three axes of twenty
-cosines each."""
+"""Largest number of columns used to predict the gain of log evidence by a group: three
+axes of twenty cosines each."""
 
 Kind = Literal["effect", "random", "noise", "unknown", "position", "given"]
 
@@ -55,10 +55,12 @@ class Group:
     part : "acc", "gyr", a channel, or "" for all channels it changes
     columns : (k,) indices in the dictionary
     typical : (k,) standard deviation of each column at size v = 1
-    effect, shape, origin : of an effect with an equation
+    effect : effect of the catalogue, if its columns follow from an equation
+    shape, origin : grid point of the effect's shape parameters, and its origin of times
     params : (k,) index of each column among the effect's parameters
-    position : position it belongs to, -1 for all
-    moved_positions : positions that it rotates by the same angle, if not all
+    position : position that it belongs to, -1 for all
+    moved_positions : positions that it rotates by the same angle, or windows that a
+        single turn connects; empty if it acts on all
     in_state : whether the base state contains its estimate
     changes_together : whether a single cause may change all columns by the same amount
     shape_sigma : standard uncertainty of the shape; nan unless it was refined
@@ -88,9 +90,9 @@ class Group:
     def leading_columns(self) -> Index:
         """Indices, within the group, of the columns of largest typical size.
 
-        They predict the worth of the group. The quick cosines of a course hardly change
-        it, except for a random walk far above the noise. All columns of a group that
-        has at most `MAX_OFFERED_COLUMNS`.
+        They predict the gain of log evidence by the group. The fast cosines of a course
+        hardly change this gain, except for a random walk far above the noise. They are
+        all columns if the group has at most `MAX_OFFERED_COLUMNS`.
         """
         if len(self.columns) <= MAX_OFFERED_COLUMNS:
             return np.arange(len(self.columns))
@@ -98,14 +100,14 @@ class Group:
         return np.sort(order[:MAX_OFFERED_COLUMNS])
 
     def with_same_parameters(self, others: Iterable[Group]) -> list[Group]:
-        """Groups among others with the same parameters and any shape."""
+        """Groups among `others` with the same parameters, origin and position."""
         own = (self.params, self.origin, self.position, self.shape.keys())
         return [
             g for g in others if (g.params, g.origin, g.position, g.shape.keys()) == own
         ]
 
     def with_same_shape(self, others: Iterable[Group]) -> list[Group]:
-        """Groups among others with the same shape and any parameters."""
+        """Groups among `others` with the same shape, origin and position."""
         own = (self.origin, self.position, self.shape)
         return [g for g in others if (g.origin, g.position, g.shape) == own]
 
@@ -121,9 +123,9 @@ class Group:
                     for k, v in self.shape.items()), default=0.0)  # fmt: skip
 
     def prior_sigma(self, v: float) -> Array:
-        """Standard deviation of each column before the rows are seen, (k,)."""
-        wide: Array = v * self.typical
-        return wide
+        """Prior standard deviation of each column at size v, (k,)."""
+        sigma: Array = v * self.typical
+        return sigma
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,7 +142,8 @@ class Cause:
         "unknown" function without physics, error of a "position", or "given"
     position : position whose angles it changes, one of several causes of the same name;
         -1 if it does not belong to one
-    expected : variants that begin where the device may have been off: they are likelier
+    expected : variants that begin when the device may have been switched off; they have
+        a higher prior probability
 
     """
 
@@ -165,9 +168,10 @@ class Cause:
         if other.cause != self.name or not other.begins_at_instant:
             return ()
         if other not in self._nearest:
-            apart = [g.shape_distance(other) for g in self.variants]
-            least, each = min(apart), zip(self.variants, apart, strict=True)
-            self._nearest[other] = tuple(g for g, d in each if d == least)
+            distances = [g.shape_distance(other) for g in self.variants]
+            pairs = zip(self.variants, distances, strict=True)
+            nearest = min(distances)
+            self._nearest[other] = tuple(g for g, d in pairs if d == nearest)
         return self._nearest[other]
 
     def full_variant(self, group: Group) -> Group:
@@ -177,9 +181,9 @@ class Cause:
         return whole if part else group
 
     def single_errors_of(self, group: Group) -> tuple[Group, ...]:
-        """The single position errors that a variant combines; else the variant."""
+        """The variants of single angle errors that a variant combines, or itself."""
         if self.kind != "position":
-            return (group,)  # of other kinds, a group is never a sum of several causes
+            return (group,)  # only angle errors have variants that combine others
         own = {*group.columns.tolist()}
         parts = tuple(g for g in self.variants if own > {*g.columns.tolist()})
         return parts or (group,)
@@ -188,34 +192,35 @@ class Cause:
         """The cause with all variants of known size v; unchanged if v is None."""
         if v is None:
             return self
-        every = tuple(replace(group, fixed_size=v) for group in self.variants)
-        return replace(self, variants=every)
+        variants = tuple(replace(group, fixed_size=v) for group in self.variants)
+        return replace(self, variants=variants)
 
     def expecting_within(self, spans: Sequence[tuple[float, float]]) -> Cause:
         """The cause with additional variants that begin within some spans, s.
 
-        These have all axes and the typical size v = 1, and are likelier than others.
+        `spans` are pairs of start and end. The new variants have all axes and the size
+        v = 1, and are `expected`: they have a higher prior probability.
         """
         if not (spans and self.variants and self.variants[0].begins_at_instant):
             return self
-        every = max((g.params for g in self.variants), key=len)
-        some = [
+        all_params = max((g.params for g in self.variants), key=len)
+        within = [
             replace(g, fixed_size=1.0)
             for g in self.variants
-            if g.params == every
+            if g.params == all_params
             and any(a <= at <= b for at in g.shape.values() for a, b in spans)
         ]
-        variants = (*self.variants, *some)
-        return replace(self, variants=variants, expected=frozenset(some))
+        variants = (*self.variants, *within)
+        return replace(self, variants=variants, expected=frozenset(within))
 
     @property
     def usual(self) -> bool:
-        """Whether every triad has it until it is calibrated."""
+        """Whether every uncalibrated triad has it."""
         return any(g.effect is not None and g.effect.usual for g in self.variants[:1])
 
     @property
     def by_window(self) -> bool:
-        """Whether it changes windows one by one: angle errors and unknown offsets."""
+        """Whether it acts on each window separately, as angle errors and offsets do."""
         return self.kind == "position" or self.name in ("window", "position")
 
     @property

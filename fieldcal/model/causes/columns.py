@@ -44,8 +44,8 @@ class RowView:
     Attributes
     ----------
     nominal : inputs of the device without the state's rotations and motion effects
-    x : inputs with them
-    since : (o, n) s since the turn, by origin
+    x : inputs of the device with them
+    since : (o, n) s since the turn, by origin of the time
     state : the base state
     rotations : cached result of `small_rotation`
 
@@ -55,7 +55,7 @@ class RowView:
     x: Experience
     since: Array
     state: State
-    # a copy with other inputs has none of what was calculated from these
+    # caches; not passed on to copies, which may have other inputs
     _by_origin: dict[int, Experience] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -78,8 +78,9 @@ class RowView:
 class Course:
     """A function of the row alone, (n, m), on every channel: 6 m columns.
 
-    `timed` states that the function is also known during turns; `while_output_stands`
-    that it acts during a turn while a gyroscope output keeps its value of the windows.
+    n rows, m functions. `timed` states that the function is also known during turns;
+    `while_output_stands` that it acts during a turn only while a gyroscope output keeps
+    the value that it has in the windows.
     """
 
     name: str
@@ -97,8 +98,8 @@ class General:
     ----------
     name : of the basis
     evaluate : calculates the columns
-    sides : if it changes the inputs in positions: yields, for each column, the inputs a
-        step up, a step down, and the step
+    sides : if it changes the inputs of the device: yields, for each column, the inputs
+        for a parameter one step up and one step down, and the step
     per_position : whether every position has columns of its own, in sequence; `sides`
         then changes all positions at once
     needs_whole_turn : whether its value in a row of a turn depends on neighbouring rows
@@ -171,8 +172,8 @@ def separable_basis(
             inputs = view.with_origin(origin)
             pattern = effect.pattern(inputs)
             courses = [effect.course(inputs, shape or NO_SHAPE) for shape, _ in points]
-            each = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
-            parts.append(each.reshape(len(view.x), 6, -1))
+            product = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
+            parts.append(product.reshape(len(view.x), 6, -1))
         return np.concatenate(parts, axis=2)
 
     return General(effect.id, of)
@@ -192,14 +193,17 @@ def _central_differences(sides: Sides) -> Callable[[RowView], Array]:
 
 
 def _difference(up: Experience, down: Experience, step: float, state: State) -> Array:
-    """Central difference of the outputs (n, 6) for two sets of inputs."""
+    """Derivative of the outputs (n, 6) as a central difference.
+
+    `up` and `down` are the inputs for a parameter one `step` higher and lower.
+    """
     change: Array = np.hstack([up.f - down.f, up.w - down.w]) * state.scale
     for term in state.terms:
         if isinstance(term.effect, Sensor):
             shape = term.shape or NO_SHAPE
             ends = (term.effect.design(x, shape) for x in (up, down))
-            one, other = (design @ term.values for design in ends)
-            change = change + one - other
+            at_up, at_down = (design @ term.values for design in ends)
+            change = change + at_up - at_down
     return change / (2 * step)
 
 
@@ -259,17 +263,18 @@ earth = _central_differences(earth_sides)
 def earth_rate_unoriented(view: RowView) -> Array:
     """Columns of the Earth's rate in unknown orientations, (n, 6, 4), rad/s.
 
-    Three constant rates in device axes: a device that is turned by hand about one level
-    axis has the Earth's rate along that axis in every position and during turns. One
-    rate along the force: the vertical part of the Earth's rate. Zero in rows whose
-    gyroscopes show the direction of the Earth's rate.
+    The first three are constant rates in device axes: if a device is turned by hand
+    about one level axis, the Earth's rate along that axis is the same in every position
+    and during turns. The fourth is a rate along the force, the vertical part of the
+    Earth's rate. All are zero in rows whose gyroscopes show the direction of the
+    Earth's rate.
     """
     free = view.nominal.earth_unseen
     f = view.x.f
     up = f / np.maximum(np.linalg.norm(f, axis=1), 1e-12)[:, None]
     along = np.hstack([np.zeros_like(up), up])[:, :, None]
-    every = np.tile(np.eye(6)[:, 3:], (len(f), 1, 1))
-    out: Array = np.concatenate([every, along], axis=2) * view.state.scale[:, None]
+    constant = np.tile(np.eye(6)[:, 3:], (len(f), 1, 1))
+    out: Array = np.concatenate([constant, along], axis=2) * view.state.scale[:, None]
     return out * free[:, None, None]
 
 
@@ -291,8 +296,9 @@ def earth_rate_direction(view: RowView) -> Array:
 def attitude(view: RowView) -> Array:
     """Columns of errors of measured attitudes, (n, 6, 3 p), rad.
 
-    Small rotations of each position about x, y and z of the base. They rotate the force
-    and the Earth's rate in device axes. A turn depends on the errors at both ends.
+    They are small rotations of each of p positions about x, y and z of the base, which
+    rotate the force and the Earth's rate in device axes. A turn depends on the errors
+    at both ends.
     """
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 3 * places))
@@ -300,8 +306,8 @@ def attitude(view: RowView) -> Array:
     axes = np.swapaxes(view.x.to_device[held], 1, 2)  # of the base, in device axes
     at = 3 * view.nominal.position[held]
     for i in range(3):
-        off = [np.cross(v[held], axes[:, i]) for v in (view.x.f, view.x.w)]
-        out[held, :, at + i] = view.state.scale * np.nan_to_num(np.hstack(off))
+        change = [np.cross(v[held], axes[:, i]) for v in (view.x.f, view.x.w)]
+        out[held, :, at + i] = view.state.scale * np.nan_to_num(np.hstack(change))
     return out
 
 
@@ -310,8 +316,8 @@ def attitude_sides(plain: Experience, state: State) -> Iterator[CentralDifferenc
     known = state.attitude
     if not known.any():
         known = np.zeros((len(state.small_rotation), 3))
-    for off in ROTATION_STEP_RAD * np.eye(3):
-        ends = (replace(state, attitude=known + s * off) for s in (1.0, -1.0))
+    for step in ROTATION_STEP_RAD * np.eye(3):
+        ends = (replace(state, attitude=known + s * step) for s in (1.0, -1.0))
         up, down = (shifted.experienced(plain) for shifted in ends)
         yield up, down, ROTATION_STEP_RAD
 
@@ -321,8 +327,8 @@ def small_rotation_sides(
 ) -> Iterator[CentralDifference]:
     """Inputs for two small rotations of every position, rad."""
     small = state.small_rotation
-    for off in ROTATION_STEP_RAD * np.eye(2):
-        ends = (replace(state, small_rotation=small + s * off) for s in (1.0, -1.0))
+    for step in ROTATION_STEP_RAD * np.eye(2):
+        ends = (replace(state, small_rotation=small + s * step) for s in (1.0, -1.0))
         up, down = (shifted.experienced(plain) for shifted in ends)
         yield up, down, ROTATION_STEP_RAD
 

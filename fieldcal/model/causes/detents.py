@@ -22,9 +22,9 @@ class Detent:
 
     Attributes
     ----------
-    joint : 0 of alpha, 1 of beta
-    angle : rad
-    positions : in which it is set
+    joint : 0 for alpha, 1 for beta
+    angle : set angle, rad
+    positions : positions in which this angle is set
 
     """
 
@@ -46,28 +46,31 @@ def detents(x: Experience, oriented: Sequence[int] | Index) -> Iterator[Detent]:
 
 
 def detent_rotations(shared: Sequence[Detent], places: int) -> Array:
-    """Rotations of the positions by each detent, (2 p, m): 1 where its angle is set."""
+    """Rotations of p positions by m detents, (2 p, m): 1 where the angle is set.
+
+    Rows are the angles alpha and beta of each position.
+    """
     out = np.zeros((2 * places, len(shared)))
     for k, detent in enumerate(shared):
         out[2 * np.array(detent.positions) + detent.joint, k] = 1.0
     return out
 
 
-def detent_columns(table: ColumnTable, some: Sequence[Detent]) -> Index:
-    """Append columns of the detents' errors, rad, to a table; their indices, (m,)."""
-    shared = detent_rotations(some, table.position_count)
+def detent_columns(table: ColumnTable, shared: Sequence[Detent]) -> Index:
+    """Append a column, rad, for the error of each detent; their indices, (m,)."""
+    rotations = detent_rotations(shared, table.position_count)
 
     def sides(plain: Experience, state: State) -> Iterator[columns.CentralDifference]:
-        """Central differences at both ends of a turn."""
+        """Inputs for a change of each detent's error, a step up and down."""
         small = state.small_rotation
-        for column in shared.T:
-            off = columns.ROTATION_STEP_RAD * column.reshape(small.shape)
-            ends = (replace(state, small_rotation=small + s * off) for s in (1, -1))
+        for column in rotations.T:
+            step = columns.ROTATION_STEP_RAD * column.reshape(small.shape)
+            ends = (replace(state, small_rotation=small + s * step) for s in (1, -1))
             up, down = (shifted.experienced(plain) for shifted in ends)
             yield up, down, columns.ROTATION_STEP_RAD
 
     basis = General(
-        "detents", lambda v: columns.small_rotation(v) @ shared, sides=sides
+        "detents", lambda v: columns.small_rotation(v) @ rotations, sides=sides
     )
-    at: Index = table.add(basis, shared.shape[1]) + np.arange(shared.shape[1])
+    at: Index = table.add(basis, len(shared)) + np.arange(len(shared))
     return at

@@ -42,11 +42,13 @@ class Dictionary(ColumnTable):
     x : rows of the windows
     used : (n, 6) rows with information, by channel
     since : (o, n) s since the turn, by origin
-    common : (p, 6) standard deviation of an error that all rows of a window share
+    common : (p, 6) standard deviation of an error that all rows of a window share,
+        units of the output
     unit : (6,) outputs per SI unit
     turns : whether the turns between positions were recorded
     wander : how the biases wander inside windows
-    alike : (6,) standard deviation of an error that all windows share
+    shared_error : (6,) standard deviation of an error that all windows share, units of
+        the output; None if there is none
 
     Attributes
     ----------
@@ -71,7 +73,7 @@ class Dictionary(ColumnTable):
         unit: Array,
         turns: bool,
         wander: Wander,
-        alike: Array | None = None,
+        shared_error: Array | None = None,
     ) -> None:
         super().__init__(x, used, since, unit, wander)
         self.window_error, self.turns = common, turns
@@ -79,7 +81,7 @@ class Dictionary(ColumnTable):
         self.always: list[Group] = [
             *self._calibration(), *self._gravity(), *self._unoriented_earth(),
             *self._attitudes(), *self._speeds(), *self._filters(),
-            *self._shared_rounding(alike),
+            *self._shared_rounding(shared_error),
         ]  # fmt: skip
         self.unoriented = np.array(
             [self._is_unoriented(p) for p in self.window_positions]
@@ -90,10 +92,10 @@ class Dictionary(ColumnTable):
         self.causes: list[Cause] = list(self._causes())
 
     def calibration_only(self) -> Dictionary:
-        """A copy whose permanent groups are bias and scale factor, without prior limit.
+        """A copy whose permanent groups are bias and scale factor with wide priors.
 
-        It contains no random group and no unknown part of the Earth's rate, as a
-        simulation contains none.
+        Like a simulation it has no random group and no unknown part of the Earth's
+        rate.
         """
         out = copy(self)
         known = (g for g in self.always if g.in_state and g.cause != "earth")
@@ -102,7 +104,7 @@ class Dictionary(ColumnTable):
         return out
 
     def instability_sigma(self, instability: Sequence[int]) -> Array:
-        """Standard deviation of the instability of some indices, (7,)."""
+        """Standard deviation (7,) of instabilities, from indices in `priors.SIZES`."""
         sigma: Array = priors.SIZES[list(instability)] * self.typical_instability
         return sigma
 
@@ -217,15 +219,15 @@ class Dictionary(ColumnTable):
     def _speeds(self) -> Iterator[Group]:
         """Group of the errors of a rate table's speeds, if its axis is not known.
 
-        One error for each speed. It contains the Earth's rate along the axis, which is
-        the same for all orientations of the device on the table.
+        There is one relative error for each speed. It includes the Earth's rate along
+        the axis of the table, which does not depend on the orientation of the device.
         """
         known = np.unique(self.x.speed[self.x.speed > 0])
         if not len(known) or not np.isin(self.observed, (3, 4, 5)).any():
             return
         at = self.add(General("speed", columns.speed(known)), len(known))
-        off = np.array([self.x.speed_sigma[self.x.speed == v].max() for v in known])
-        wide = np.hypot(off, EARTH_RATE / 3**0.5) / known
+        error = np.array([self.x.speed_sigma[self.x.speed == v].max() for v in known])
+        wide = np.hypot(error, EARTH_RATE / 3**0.5) / known
         yield Group("speed", "gyr", at + np.arange(len(known)), wide, fixed_size=1.0)
 
     def _filters(self) -> Iterator[Group]:

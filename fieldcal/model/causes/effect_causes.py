@@ -58,8 +58,9 @@ def effect_group(
 ) -> Group:
     """Group of an effect of the catalogue with all its parameters, of typical size.
 
-    If the device is `turned` by an unknown rotation, parameters that such a rotation
-    makes of others are omitted. `point` is its shape, if it has one.
+    If the device is `turned` by an unknown rotation, the parameters that such a
+    rotation cannot distinguish from others are omitted (`Effect.turned_into`). `point`
+    is the grid point of its shape, if it has one.
 
     Raises
     ------
@@ -87,7 +88,7 @@ def factory_group(
     turned: bool,
     point: Point = NO_POINT,
 ) -> Group:
-    """Group of an effect that the factory left, with coefficients of known size, SI."""
+    """Group of a factory error, whose coefficients have the known sigma `size`, SI."""
     group = effect_group(table, name, turned, point)
     wide = (size * units_of(table, catalogue()[name]))[list(group.params)]
     return replace(group, cause="factory", part=name, typical=wide, fixed_size=1.0)
@@ -96,7 +97,7 @@ def factory_group(
 def factory_groups(
     table: ColumnTable, left: FactoryErrors, turned: bool
 ) -> list[Group]:
-    """Groups of the errors that the factory left and that are not estimated.
+    """Groups of the factory errors `left`, which are included and not reported.
 
     Biases follow the temperature if a thermometer shows a change, and the warm-up of
     the package otherwise.
@@ -114,7 +115,7 @@ def factory_groups(
 
 
 def factory_sizes(x: Experience, left: FactoryErrors) -> dict[str, Array]:
-    """Standard deviation of each effect that a factory left, SI: one value, or (6,)."""
+    """Standard deviation, SI, of each factory error by name: (1,), or (6,)."""
     sizes = {name: np.array([size]) for name, size in left.by_effect.items()}
     sizes["hysteresis"] = np.array([left.hysteresis])
     name, per_k = left.warming_effect(x.warms)
@@ -143,10 +144,10 @@ def _group(
     at: Index,
 ) -> Group:
     """Group of some parameters of an effect at one grid point."""
-    every = np.array([p.typical for p in effect.params]) * units_of(table, effect)
+    typical = np.array([p.typical for p in effect.params]) * units_of(table, effect)
     shape, origin = point
     return Group(
-        effect.id, part, at[list(params)], every[list(params)], effect, shape, origin,
+        effect.id, part, at[list(params)], typical[list(params)], effect, shape, origin,
         params, in_state=True,
     )  # fmt: skip
 
@@ -173,7 +174,10 @@ def effect_columns(
 def parameter_groups(
     table: ColumnTable, effect: Effect
 ) -> list[tuple[str, tuple[int, ...]]]:
-    """Parts and parameter indices of an effect: by triad if it has one per channel."""
+    """Parts and parameter indices of an effect.
+
+    One part for each triad if its parameters are named after channels; else one, "".
+    """
     names = [p.name for p in effect.params]
     if not set(names) <= set(CHANNELS):
         return [("", tuple(range(len(names))))]
@@ -188,15 +192,18 @@ def parameter_groups(
 def _parameter_subsets(
     table: ColumnTable, effect: Motion | Sensor, at: tuple[int, ...]
 ) -> list[tuple[int, ...]]:
-    """Subsets of parameters that form variants: all, or those of one or two outputs."""
+    """Subsets of parameters that form variants: all, or those of one or two outputs.
+
+    `at` are the indices of the parameters of one part.
+    """
     if isinstance(effect, Motion) or not at:
         return [at] if at else []
     reach = np.abs(effect.design(table.x, _any_shape(effect))).max(axis=0)[:, at]
-    own = [tuple(np.array(at)[reach[c] > 0].tolist()) for c in range(6)]
-    own = [o for o in own if o and o != at]
-    two = [tuple(sorted(set(o + p))) for o, p in combinations(own, 2)]
-    more = [*own, *([] if effect.shapes else two)]
-    return [at, *(o for o in dict.fromkeys(more) if o != at)]
+    of_output = [tuple(np.array(at)[reach[c] > 0].tolist()) for c in range(6)]
+    of_output = [subset for subset in of_output if subset and subset != at]
+    of_two = [tuple(sorted(set(a + b))) for a, b in combinations(of_output, 2)]
+    subsets = [*of_output, *([] if effect.shapes else of_two)]
+    return [at, *(subset for subset in dict.fromkeys(subsets) if subset != at)]
 
 
 def units_of(table: ColumnTable, effect: Effect) -> Array:

@@ -17,7 +17,7 @@ class EqualWidthGroups:
 
     Attributes
     ----------
-    blocks : (b, k) distinct sets of columns; several groups may share one
+    blocks : (b, k) distinct sets of columns; several groups may share a set
     block : (m,) index of each group's set of columns
     typical : (m, k) typical sizes
     cause, variant : (m,) indices of each group's cause and variant
@@ -31,10 +31,10 @@ class EqualWidthGroups:
     variant: Index
 
     @classmethod
-    def of(cls, some: Sequence[tuple[int, int, Group]]) -> EqualWidthGroups:
+    def of(cls, groups: Sequence[tuple[int, int, Group]]) -> EqualWidthGroups:
         """Stack groups; each is given with the indices of its cause and variant."""
-        columns = np.array([g.columns[g.leading_columns] for _, _, g in some])
+        columns = np.array([g.columns[g.leading_columns] for _, _, g in groups])
         blocks, block = np.unique(columns, axis=0, return_inverse=True)
-        typical = np.array([g.typical[g.leading_columns] for _, _, g in some])
-        cause, variant = np.array([(i, j) for i, j, _ in some]).T
+        typical = np.array([g.typical[g.leading_columns] for _, _, g in groups])
+        cause, variant = np.array([(i, j) for i, j, _ in groups]).T
         return cls(blocks, block.ravel(), typical, cause, variant)

@@ -1,16 +1,17 @@
 """Flicker in the means of a few windows, as a series of principal components.
 
-Rows of a long window are much longer at its end than at its beginning, and flicker is
-in all of them: no even cosines of the time describe it. The means of flicker with the
-one-sided power 1 / 2 over the frequency, over intervals [a, b] and [c, d], have the
-covariance, but for a constant that a bias takes in,
+The rows of a long window are short at its beginning and long at its end, s to minutes.
+Cosines at equal steps of frequency do not describe flicker in such rows. The means of
+flicker, with the one-sided power density 1 / (2 f), over intervals [a, b] and [c, d]
+have the covariance, except for a constant that is part of the bias,
 
     C = -1/2 [H(b - c) - H(a - c) - H(b - d) + H(a - d)] / ((b - a) (d - c))        (1)
 
-with H(x) = x^2 (ln|x| / 2 - 3 / 4), whose second derivative is ln|x|. Its largest
-eigenvectors are the series. What they leave of a row is noise, nearly white. Its size a
-is told by what the rows y, of white noise D, have besides the series: with Q the other
-eigenvectors, of the variances v,
+with H(x) = x^2 (ln|x| / 2 - 3 / 4), whose second derivative is ln|x|. The eigenvectors
+with the largest eigenvalues are the terms of the series. The remaining part of each row
+is nearly white noise. Its size a is estimated from the components of the rows y along
+the other eigenvectors Q, which have the variances v; D is the diagonal matrix of the
+variances of white noise of the rows:
 
     Q^T y ~ N(0, a^2 diag(v) + Q^T D Q)                                             (2)
 
@@ -27,10 +28,10 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 
 MIN_TERMS, MAX_TERMS = 40, 80
-"""Terms of a series, half as many as there are rows."""
+"""Bounds of the number of terms, which is half the number of rows."""
 
 MISSING_ROW_NOISE = 1e3
-"""Noise assumed for a missing row, as a multiple of the noisiest row's."""
+"""Noise assumed for a missing row, as a multiple of the noise of the noisiest row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +41,10 @@ class FlickerSeries:
     Attributes
     ----------
     t : (n,) s, the middle of each row, in order
-    terms : (n, k) of about size one
-    sizes : (k,) standard deviation of the coefficient of each
-    others : (n, m) eigenvectors besides
-    variances : (m,) of their coefficients
+    terms : (n, k) terms of the series, each of rms 1 / sqrt(2)
+    sizes : (k,) standard deviation of the coefficient of each term
+    others : (n, m) the eigenvectors Q that are not in the series
+    variances : (m,) v, variances of their coefficients
 
     """
 
@@ -60,7 +61,7 @@ class FlickerSeries:
         whole = whole - whole.mean(axis=0)
         whole = whole - whole.mean(axis=1)[:, None]
         variance, along = np.linalg.eigh(whole)
-        order = np.argsort(variance)[:0:-1]  # one is the mean's
+        order = np.argsort(variance)[:0:-1]  # without the smallest: that of the mean
         variance, along = np.maximum(variance[order], 0.0), along[:, order]
         k, even = int(np.clip(len(t) // 2, MIN_TERMS, MAX_TERMS)), np.sqrt(len(t) / 2)
         return cls(
@@ -92,7 +93,10 @@ class FlickerSeries:
         return np.outer(unit, (size * typical) ** 2)
 
     def _size(self, y: Array, sd: Array, typical: float) -> float:
-        """Most probable size of flicker beside white noise, by (2)."""
+        """Most probable size v of flicker besides white noise, by (2).
+
+        `y`, `sd` (n,) are rows and their white noise; `typical` is flicker at v = 1.
+        """
         half = np.linalg.cholesky(self.others.T @ (self.others * sd[:, None] ** 2))
         white = np.linalg.solve(half, np.diag(typical * np.sqrt(self.variances)))
         flicker, axes = np.linalg.eigh(white @ white.T)
@@ -106,13 +110,13 @@ class FlickerSeries:
 def _covariance(start: Array, end: Array) -> Array:
     """Covariance of the means over intervals, (n, n), by (1)."""
     length = end - start
-    apart = (
+    integral = (
         _integrated(np.subtract.outer(end, start))
         - _integrated(np.subtract.outer(start, start))
         - _integrated(np.subtract.outer(end, end))
         + _integrated(np.subtract.outer(start, end))
     )
-    out: Array = -0.5 * apart / np.outer(length, length)  # (1)
+    out: Array = -0.5 * integral / np.outer(length, length)  # (1)
     return out
 
 

@@ -1,11 +1,12 @@
-"""Hysteresis of the accelerometers: what the last turn leaves in their biases.
+"""Hysteresis of the accelerometers: a part of their bias depends on the last turn.
 
     U_i += h_i clip((f_i - f_i,before) / g, -1, 1)
 
-f_before is the force in the position before; in the first position it is not known, and
-the term is part of the bias. A suspension that was bent one way does not return as far
-as from the other, and a smaller loop leaves less. Source: IEEE Std 1293, hysteresis
-error, which is that of the whole range.
+f_i,before is the force along axis i in the previous position, m/s^2, and h_i the
+hysteresis, m/s^2. In the first position f_i,before is not known, and the term is part
+of the bias. A suspension returns to a position that depends on the side from which the
+force came; the difference is smaller after a smaller change. Source: IEEE Std 1293,
+whose hysteresis error is that of a cycle over the whole range.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from fieldcal.model.causes.columns import General, RowView
 
 
 def hysteresis(table: ColumnTable, size: float) -> Group:
-    """The columns of three accelerometers, of a known size, m/s^2."""
+    """Group of the three accelerometers; `size` is the sigma of h, m/s^2."""
     held = np.unique(table.x.position[table.x.position >= 0])
     force = np.array([table.x.f[table.x.position == p].mean(axis=0) for p in held])
 
     def columns(view: RowView) -> Array:
         x, out = view.x, np.zeros((len(view.x), 6, 3))
-        planned = (x.position < 0) & x.oriented  # a position that may come last
+        planned = (x.position < 0) & x.oriented  # a further position at the end
         reached = np.flatnonzero((x.position > held[0]) | planned)
         last = np.where(planned, len(held), np.searchsorted(held, x.position))[reached]
         change = x.f[reached] - force[last - 1]

@@ -2,7 +2,8 @@
 
     residual = design u + e,    e ~ N(0, 1)                                         (1)
 
-They count as any other rows do, in the estimate and in the evidence of every set.
+with u the parameters of some columns. These rows are used like all other rows in the
+estimate and in the evidence of every set.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ class KnownRows:
 
     Attributes
     ----------
-    columns : (k,) of the dictionary
-    design : (r, k)
-    residual : (r,)
+    columns : (k,) indices of columns in the dictionary
+    design : (r, k) derivatives of the rows by these columns
+    residual : (r,) values less those of the base state
 
     """
 
@@ -33,7 +34,7 @@ class KnownRows:
 
     @classmethod
     def of(cls, design: Array, residual: Array, covariance: Array) -> KnownRows:
-        """Rows of a design (r, all) with values (r,) and covariance (r, r)."""
+        """Rows of a design (r, all columns), with residual (r,), covariance (r, r)."""
         columns = np.flatnonzero(design.any(axis=0))
         root = np.linalg.cholesky(covariance)
         return cls(

@@ -1,19 +1,20 @@
-"""Leaning: what a device lies on gives way, so it turns slowly within a stop.
+"""Leaning: the support of a device gives way, so the device turns slowly in a stop.
 
-A vehicle stands on tyres, a box on grass or foam. In a stop whose orientation nobody
-set, the angle about each of two axes across the force is a random walk about its mean,
+Examples are a vehicle on its tyres, and a box on grass or foam. In a stop whose
+orientation is not set by a fixture, the angle about each of two axes across the force
+is a random walk about its mean, from the start t_0 to the end t_1 of the stop,
 
     theta_i(t) = sum_k a_ik cos(pi k u),   u = (t - t_0) / (t_1 - t_0),  a_ik ~ 1 / k,
 
-and a device that turns by theta about e reads
+A device that is turned by theta, rad, about the unit vector e measures
 
     f' = f - theta e x f,    w' = w + (d theta / dt) e                              (1)
 
-so the length of the force stays, which is what tells it from a bias that changes. A
-fixture is taken to stand firm: how well its angles are set is known otherwise. Where
-most stops turn so, somebody holds the device (`hand_tremor`). A turn between two stops
-goes from the mean of the one to that of the other: the lean at its ends is in what
-closures scatter by.
+The length of the force does not change; this distinguishes leaning from a bias that
+changes. Stops with angles set by a fixture have no such columns. If most stops lean, a
+hand holds the device (`hand_tremor`). The orientation of a stop is its mean; the
+difference between the mean and the lean at the ends of a turn is part of the scatter of
+closures.
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ def leaning(table: ColumnTable) -> Group | None:
     first = np.cumsum([0, *(2 * waves)])
 
     def columns(view: RowView) -> Array:
-        """(n, 6, k), of each stop about one axis and then about the other, (1)."""
+        """Columns (n, 6, k) by (1): for each stop the cosines about both axes."""
         out = np.zeros((len(view.x), 6, first[-1]))
-        each = zip(first[:-1], held, waves, ends, strict=True)
-        for at, p, count, (begin, end) in each:
+        stops = zip(first[:-1], held, waves, ends, strict=True)
+        for at, p, count, (begin, end) in stops:
             rows = np.flatnonzero((view.x.position == p) & ~view.nominal.oriented)
             f, k = view.x.f[rows], np.arange(1, count + 1)
             phase = np.pi * np.outer((view.x.t[rows] - begin) / (end - begin), k)
@@ -50,8 +51,8 @@ def leaning(table: ColumnTable) -> Group | None:
                 about = np.cross(side, f) / (f**2).sum(axis=1, keepdims=True)
                 turned = [side[:, :, None] * np.cos(phase)[:, None],
                           about[:, :, None] * speed[:, None]]  # fmt: skip
-                some = slice(at + axis * count, at + (axis + 1) * count)
-                out[rows, :, some] = np.concatenate(turned, axis=1)
+                cosines = slice(at + axis * count, at + (axis + 1) * count)
+                out[rows, :, cosines] = np.concatenate(turned, axis=1)
         out *= view.state.scale[:, None]
         return out
 

@@ -2,8 +2,8 @@
 
 Always included are bias and scale factor of both triads, the difference of the two
 clocks, the rotation between the two sets of axes, and free values for channels that the
-reference lacks. Effects that change positions do not apply. Coloured noise is in the
-weights of the rows.
+reference lacks. Effects that change positions do not apply. Coloured noise is included
+in the weights of the rows, so it needs no columns.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class CurrentAlignment:
 
     Attributes
     ----------
-    rows : at that alignment
-    change : (n, 6) time derivative of force and rate, per second
+    rows : rows at that alignment
+    change : (n, 6) time derivatives of force, m/s^3, and rate, rad/s^2
 
     """
 
@@ -81,12 +81,12 @@ class MotionDictionary(Dictionary):
     def _calibration(self) -> Iterator[Group]:
         """Groups of bias, scale factor, clocks, rotation and missing channels."""
         yield from super()._calibration()
-        place, free = self.current, priors.FREE_SIZE
-        self.missing_channels = lost = place.rows.reference.missing_channels
+        current, free = self.current, priors.FREE_SIZE
+        self.missing_channels = missing = current.rows.reference.missing_channels
 
         def clock(view: RowView) -> Array:
-            change = place.change
-            since = place.rows.middles - place.rows.alignment.middle
+            change = current.change
+            since = current.rows.middles - current.rows.alignment.middle
             # of (1) of `rows.motion`
             by = np.stack([-change, change * since[:, None]], axis=2)
             out: Array = view.state.scale[:, None] * by
@@ -103,9 +103,9 @@ class MotionDictionary(Dictionary):
 
         def unseen(view: RowView) -> Array:
             rotation = np.zeros((6, 6))
-            rotation[ACC, ACC] = rotation[GYR, GYR] = place.rows.alignment.rotation
-            turned = view.state.scale[:, None] * rotation[:, lost]
-            return np.broadcast_to(turned, (len(view.x), 6, len(lost)))
+            rotation[ACC, ACC] = rotation[GYR, GYR] = current.rows.alignment.rotation
+            turned = view.state.scale[:, None] * rotation[:, missing]
+            return np.broadcast_to(turned, (len(view.x), 6, len(missing)))
 
         self.clock = self.add(General("clock", clock), 2)
         sizes = np.array([priors.CLOCK_S, priors.CLOCK_RATE])
@@ -113,12 +113,12 @@ class MotionDictionary(Dictionary):
         self.turn = self.add(General("turn", turn), 3)
         at = self.turn + np.arange(3)
         yield Group("turn", "", at, np.full(3, priors.AXES_TURNED), fixed_size=free)
-        if len(lost):
-            self.unseen = self.add(General("unseen", unseen), len(lost))
-            at = self.unseen + np.arange(len(lost))
+        if len(missing):
+            self.unseen = self.add(General("unseen", unseen), len(missing))
+            at = self.unseen + np.arange(len(missing))
             wide = priors.UNSEEN.copy()
-            wide[np.flatnonzero(place.rows.alignment.unseen_gravity)] = priors.UPRIGHT
-            yield Group("unseen", "", at, wide[lost], fixed_size=1.0)
+            wide[np.flatnonzero(current.rows.alignment.unseen_gravity)] = priors.UPRIGHT
+            yield Group("unseen", "", at, wide[missing], fixed_size=1.0)
 
     def _causes(self) -> Iterator[Cause]:
         """Effects that do not move positions, and functions without physics."""

@@ -1,8 +1,8 @@
-"""Columns of positions that are planned, or were not fitted.
+"""Predicted outputs in positions that are planned, or were recorded and not fitted.
 
-Outputs of the accelerometers of a device with given parameters in known positions at
-rest, and their derivatives by each parameter; the columns are those that are fitted to
-rows. m/s^2, device axes; a tilt in degrees.
+For a device with given parameters in known positions at rest: the outputs of the
+accelerometers, m/s^2 in device axes, and their derivatives by each parameter. The
+derivatives are the columns that the fit uses too. A tilt is in degrees.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def predict_outputs(
     Returns
     -------
     u : (n, 3) m/s^2
-    slope : (n, 3, k)
+    slope : (n, 3, k) derivatives of u by each parameter, in its unit
 
     """
     state = state_of(names, values)
@@ -76,7 +76,10 @@ def predict_outputs(
 
 
 def rows_at_session_end(x: Experience, alpha: Array, beta: Array) -> Experience:
-    """Rows in further positions, (n,) rad, at the time of the session's last row."""
+    """Rows in further positions at the time and temperature of the last row of `x`.
+
+    `alpha` and `beta` (n,) are the set angles, rad.
+    """
     last = np.full(len(alpha), len(x) - 1)
     force: Array = direction_cosines(alpha, beta) @ x.base_force @ x.mounting
     return Experience.at_rest(
@@ -96,7 +99,8 @@ def state_of(
     """The state of a device with given parameters, full names and (k,) values.
 
     Other parameters have their ideal values; bias and scale factor (6,) those of
-    `nominal`, if given. Groups that are no effect of the rows are ignored.
+    `nominal`, if given. Names of groups that are no effect of the catalogue with an
+    equation are ignored.
     """
     known = dict(zip(names, values, strict=True))
     bias, scale = nominal or (np.zeros(6), np.ones(6))
@@ -120,7 +124,7 @@ def design_matrix(
     gravity: float,
     mounting: Array | None = None,
 ) -> Array:
-    """Derivatives of the accelerometers about an ideal device, (n, 3, k)."""
+    """Derivatives (n, 3, k) as of `predict_outputs`, of an ideal device."""
     perfect = np.array([float(group_of(n) == "acc_scale") for n in names])
     return predict_outputs(names, perfect, positions, gravity, mounting)[1]
 

@@ -14,8 +14,8 @@ from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.leaning import leaning
-from fieldcal.model.causes.lost_way import lost_ways
 from fieldcal.model.causes.sinking import sinking
+from fieldcal.model.causes.turn_gyro_errors import turn_gyro_errors
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
@@ -30,7 +30,7 @@ def random_causes(table: ColumnTable) -> Iterator[Cause]:
     for effect in catalogue().values():
         if isinstance(effect, Scatter) and effect.applies(table.x):
             yield from _causes_of_scatter(table, effect, oriented)
-    if len(table.window_positions) >= MIN_WINDOWS:  # of fewer, it is always there
+    if len(table.window_positions) >= MIN_WINDOWS:  # else it is a permanent group
         for group in _cosine_flicker(table):
             yield Cause(
                 group.cause, group.part, priors.FLICKER_CHANCE, (group,), "noise"
@@ -40,7 +40,7 @@ def random_causes(table: ColumnTable) -> Iterator[Cause]:
     if (sinks := sinking(table)) is not None:
         yield Cause(sinks.cause, sinks.part, priors.SINK_CHANCE, (sinks,), "noise")
     if table.turns:
-        yield from lost_ways(table)
+        yield from turn_gyro_errors(table)
     if len(table.window_positions) > 3 and len(oriented):
         yield from _wrong_angles(table, oriented)
 
@@ -48,9 +48,10 @@ def random_causes(table: ColumnTable) -> Iterator[Cause]:
 def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     """Causes of a position set at wrong angles, and of an angle with a repeated error.
 
-    Only positions with known angles have either. Each may be set wrongly whether or not
-    another is: two are if their angles were exchanged. A fixture with one worn detent
-    may have others, so one variant contains all of them.
+    Both concern only the positions `oriented`, whose angles are known. Each position is
+    a cause of its own, because several may be set wrongly: two, if their angles were
+    exchanged. The repeated errors are variants of one cause: the error of one detent,
+    or errors of all detents, since a fixture with one worn detent may have others.
     """
     size = np.full(2, np.deg2rad(priors.MISSET_DEG))
     for p in oriented.tolist():
@@ -59,22 +60,22 @@ def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
         yield Cause(
             "misset", "", CHANCE / len(oriented), (group,), "position", position=p
         )
-    several = [
+    repeated = [
         d for d in detents(table.x, oriented) if 1 < len(d.positions) < len(oriented)
     ]
-    if not several:
+    if not repeated:
         return
     wide = np.full(1, np.deg2rad(priors.REPEATED_MISTAKE_DEG))
-    at = detent_columns(table, several)
+    at = detent_columns(table, repeated)
     groups = tuple(
         Group("repeated_angle", "", at[i : i + 1], wide, params=(detent.joint,),
               moved_positions=detent.positions)
-        for i, detent in enumerate(several)
+        for i, detent in enumerate(repeated)
     )  # fmt: skip
-    if len(several) > 1:
-        moved = tuple(sorted({p for detent in several for p in detent.positions}))
-        every = np.repeat(wide, len(several))
-        groups += (Group("repeated_angle", "", at, every, moved_positions=moved),)
+    if len(repeated) > 1:
+        moved = tuple(sorted({p for detent in repeated for p in detent.positions}))
+        sizes = np.repeat(wide, len(repeated))
+        groups += (Group("repeated_angle", "", at, sizes, moved_positions=moved),)
     yield Cause("repeated_angle", "", CHANCE, groups, "position")
 
 
@@ -97,9 +98,9 @@ def _causes_of_scatter(
         observed = [c for c in channels if c in table.observed]
         if observed:
             yield _walks(table, effect, part, [observed], 1.0)
-            each = [[c] for c in observed]
+            single = [[c] for c in observed]
             yield _walks(
-                table, effect, f"{part}, one axis", each, priors.SINGLE_AXIS_SHARE
+                table, effect, f"{part}, one axis", single, priors.SINGLE_AXIS_SHARE
             )
 
 
@@ -110,7 +111,10 @@ def _walks(
     channel_sets: Sequence[Sequence[int]],
     share: float,
 ) -> Cause:
-    """Cause of random walks, with a variant for each set of channels."""
+    """Cause of random walks, with a variant for each set of channels.
+
+    `share` is the part of the probability of the effect that this cause has.
+    """
     shape, modes = table.span.walk(), table.wander.modes
     groups = tuple(
         Group(
@@ -155,9 +159,14 @@ def _flicker_groups(
     shape: Array,
     sizes: tuple[float, float],
 ) -> Iterator[Group]:
-    """Group of each triad's flicker, from each channel's columns and their sizes.
+    """Group of the flicker of each triad.
 
-    `sizes` are the typical sizes of accelerometers and gyroscopes, SI.
+    Parameters
+    ----------
+    terms : columns of the series of each of the six channels
+    shape : (k,) relative standard deviation of each term of a series
+    sizes : typical sizes of accelerometers and gyroscopes, SI
+
     """
     for part, channels in TRIADS:
         at = [c for c in channels if c in table.observed]

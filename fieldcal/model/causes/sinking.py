@@ -1,15 +1,18 @@
-"""Sinking: what a fixture stands on gives way, so its base turns while it is used.
+"""Sinking: the support of a fixture gives way, so its base turns during the session.
 
-A tripod sinks into soil, a table bends, a jack leaks. The base then turns about its two
-level axes, slowly and mostly one way,
+Examples are a tripod that sinks into soil, a table that bends and a jack that leaks.
+The base turns slowly about its two level axes, i = x and z, mostly in one direction, by
+the angles
 
     theta_i(t) = sum_k a_ik P_k(u),   k = 1 .. 4,   -1 <= u <= 1 over the session,
 
-with Legendre polynomials P_k and a_ik ~ 0.2^(k - 1), as of what settles within one to
-several times the session. Every position of known angles is turned by the tilt of that
-moment. The mean is the tilt of the base; of a turn from one position to the next, what
-it sinks meanwhile is in what closures scatter by. A device that lies on something soft
-by itself leans in each stop anew (`leaning`).
+with Legendre polynomials P_k, and standard deviations of a_ik proportional to
+0.2^(k - 1), as for a support that settles with a time constant of one to several times
+the session. Every position with known angles is turned by the angles at its time. Their
+mean over the session is the base tilt, which is an effect of its own. The rotation of
+the base during a turn from one position to the next is part of the scatter of closures.
+A device that lies on a soft support without a fixture leans anew in each stop
+(`leaning`).
 """
 
 from __future__ import annotations
@@ -28,16 +31,16 @@ from fieldcal.model.turns.turn import select_rows
 NAME = "sinking"
 
 POLYNOMIALS = 4
-"""Polynomials of each angle."""
+"""Number of polynomials of each angle."""
 
 MIN_POSITIONS = 4
-"""Positions of known angles that tell a base that turns from biases."""
+"""Fewest positions with known angles that distinguish a base that turns from biases."""
 
 
 def sinking(table: ColumnTable) -> Group | None:
     """Group of all positions with known angles; None if there are too few.
 
-    None also if nobody knows when each was held: means without times.
+    None also if the rows are means without times.
     """
     x = table.x
     known = x.oriented & (x.position >= 0)
@@ -53,16 +56,18 @@ def sinking(table: ColumnTable) -> Group | None:
         rows = np.flatnonzero(view.nominal.oriented & (view.nominal.position >= 0))
         if not len(rows):
             return out
-        some = RowView(
+        oriented = RowView(
             select_rows(view.nominal, rows.tolist()),
             select_rows(view.x, rows.tolist()),
             view.since[:, rows],
             view.state,
         )  # fmt: skip
-        by = tilt.evaluate(some)  # of one degree
+        per_deg = tilt.evaluate(oriented)
         u = 2 * (view.x.t[rows] - begin) / (end - begin) - 1
         course = legvander(u, POLYNOMIALS)[:, 1:]
-        out[rows] = (by[..., None] * course[:, None, None]).reshape(len(rows), 6, -1)
+        out[rows] = (per_deg[..., None] * course[:, None, None]).reshape(
+            len(rows), 6, -1
+        )
         return out
 
     start = table.add(General(NAME, columns), 2 * POLYNOMIALS)

@@ -6,7 +6,8 @@ most similar effect. Each is a short series with decreasing terms; a course in t
 
     sum_k a_k cos(pi k s),    s = (t - t_0) / (t_1 - t_0),    k = 1 ... WAVES
 
-with a_k ~ N(0, exp(-(k / w)^2 / 2)) for a smooth course of w half waves. A random walk
+with the session from t_0 to t_1, s. For a smooth course of w half waves, a_k has a
+standard deviation proportional to exp(-(k / w)^2 / 2). A random walk
 is the same series with a_k of standard deviation q sqrt(2 T) / (pi k) (Karhunen-Loeve;
 its mean is part of the bias); a walk far above the noise needs more terms (`wander`).
 """
@@ -21,7 +22,7 @@ from fieldcal.core.samples import Array
 from fieldcal.physics.experience import Experience
 
 MAX_COSINES = 40
-"""Cosines of the fastest course; its prior makes those beyond them negligible."""
+"""Number of cosines of the fastest course; its prior makes further ones negligible."""
 
 HALF_WAVES = (1.5, 4.0, 9.0, 20.0)
 """Half waves of a smooth course over the session, from slow to fast."""
@@ -30,10 +31,10 @@ MIN_COSINE_SIZE = 1e-3
 """Relative size below which a cosine is omitted from a course."""
 
 HARMONICS = 4
-"""Sines and cosines of an angle; an effect of the fourth power has four."""
+"""Number of harmonics of an angle; an effect of its fourth power has four."""
 
 TIME_POWERS = 4
-"""Legendre polynomials of time of a force that fades or grows."""
+"""Highest power of time in Legendre polynomials that multiply the force."""
 
 MAX_SINCE_TURN_S = 1e4
 """Time since a turn from which nothing changes any more, s."""
@@ -72,7 +73,7 @@ class CourseSpan:
         return out
 
     def fading(self, x: Experience) -> Array:
-        """Force along each axis times powers of the time."""
+        """Force along each axis, in gravities, times polynomials of time, (n, 12)."""
         part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
         steps = np.polynomial.legendre.legvander(2 * part - 1, TIME_POWERS)[:, 1:]
         f = x.f / x.gravity
@@ -80,7 +81,7 @@ class CourseSpan:
         return out
 
     def temperature(self, x: Experience) -> Array:
-        """Powers of the temperature, as a part of its range."""
+        """Powers 1 to 4 of the temperature, as a part of its range, (n, 4)."""
         part = (np.nan_to_num(x.warming) - self.cold) / self.range
         return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
 
@@ -92,12 +93,15 @@ class CourseSpan:
 
 
 def smooth_course_sizes(span: float) -> Array:
-    """Standard deviation of each cosine of a course of `span` half waves, (k,)."""
+    """Standard deviation of each cosine of a course of `span` half waves, (k,).
+
+    The course has the rms 1.
+    """
     k = np.arange(1, MAX_COSINES + 1)
     sizes: Array = np.exp(-0.5 * (k / span) ** 2)
     sizes = sizes[sizes > MIN_COSINE_SIZE]
-    even: Array = sizes / np.sqrt((sizes**2).sum() / 2)
-    return even
+    unit_rms: Array = sizes / np.sqrt((sizes**2).sum() / 2)
+    return unit_rms
 
 
 def force_time_columns(axis: int) -> slice:
@@ -117,12 +121,14 @@ def beta(x: Experience) -> Array:
 
 def joints(x: Experience) -> Array:
     """Products of harmonics of both joints' angles."""
-    one, two = (_angle(a)[:, [0, 1, 4, 5]] for a in (x.alpha, x.beta))
-    out: Array = (one[:, :, None] * two[:, None, :]).reshape(len(x), -1)
+    # the sines and cosines of the first two harmonics of each angle
+    first, second = (_angle(a)[:, [0, 1, 4, 5]] for a in (x.alpha, x.beta))
+    out: Array = (first[:, :, None] * second[:, None, :]).reshape(len(x), -1)
     return out
 
 
 def _angle(angle: Array) -> Array:
+    """Sines and cosines of the harmonics of an angle (n,) rad, over k, (n, 8)."""
     k = np.arange(1, HARMONICS + 1)
     turns = np.outer(np.nan_to_num(angle), k)
     return np.hstack([np.sin(turns) / k, np.cos(turns) / k])

@@ -45,12 +45,12 @@ def unknown_causes(table: ColumnTable) -> Iterator[Cause]:
 
 
 def _has_times(table: ColumnTable) -> bool:
-    """Whether rows have times. Without, a course in time is constant, as a bias is."""
+    """Whether rows have different times; if not, a course in time is like a bias."""
     return bool(np.ptp(table.x.t) > 0)
 
 
 def typical_unknown_sizes(table: ColumnTable) -> Array:
-    """Typical size of functions without physics on each channel, (6,)."""
+    """Typical size of functions without physics on each channel, (6,), outputs."""
     out: Array = np.repeat([priors.UNKNOWN_ACC, priors.UNKNOWN_GYR], 3) * table.unit
     return out
 
@@ -104,6 +104,7 @@ def _cause(name: str, part: str, groups: Sequence[Group]) -> Cause:
 
 
 def _covers(table: ColumnTable, covariate: str) -> bool:
+    """Whether the rows vary in a covariate and their windows are numerous enough."""
     x = table.x
     if covariate in ("alpha", "beta", "joints"):
         return bool(x.oriented.all()) and len(table.window_positions) > 3

@@ -1,13 +1,14 @@
 """Variation of the biases within windows, and its part that cosines do not describe.
 
 Biases have a random walk of q per sqrt(s), or flicker: cosines k with variance a^2 / k
-over T s, a one-sided power of a^2 / 2 over the frequency (`wander_sizes`). With K
-cosines fitted, means over l s of a walk keep the variance, with z = pi l / T and m_k =
-sin(k z / 2) / (k z / 2), the mean of cosine k over l s,
+over a session of T s, a one-sided power density of a^2 / (2 f) (`wander_sizes`). K
+cosines are fitted. Let z = pi l / T, and m_k = sin(k z / 2) / (k z / 2) the mean of
+cosine k over l s. The part of a walk that the cosines do not describe has, in means
+over l s, the variance
 
     q^2 T / pi^2 [pi^2 / 6 - pi z / 6 + z^2 / 24 - sum_k m_k^2 / k^2]               (1)
 
-which is nearly white from row to row, and means of flicker
+which is nearly white from row to row. For flicker it is
 
     a^2 / 2 [3 / 2 - ln z + z^2 / 144 - sum_k m_k^2 / k]                            (2)
 
@@ -22,7 +23,7 @@ up to
 
     k = q sqrt(2 T J) / pi,    k = a^2 J,    J = sum 1 / (2 s^2)                    (5)
 
-K is twice that, since as many more are still significant together.
+K is twice that: the same number of further cosines is significant only jointly.
 Source: Karhunen-Loeve series of Brownian motion; IEEE Std 952 for flicker noise.
 """
 
@@ -42,7 +43,7 @@ from fieldcal.model.rows.lean_modes import lean_modes
 from fieldcal.model.rows.reduce import Rows
 
 COSINES_PER_VISIBLE = 2.0
-"""Number of cosines used, in those that each exceed the noise of the rows."""
+"""Number of cosines used over the number that each exceed the noise of the rows."""
 
 MIN_PHASE = 1e-12
 """Least phase between two means; flicker diverges at zero."""
@@ -54,7 +55,7 @@ class Wander:
 
     Attributes
     ----------
-    walk_rate : (6,) random walk q of each output, per sqrt(s), given that it walks
+    walk_rate : (6,) random walk q of each output, per sqrt(s), given that it has one
     flicker : (6,) flicker a of each output, given that it has flicker
     share : (6,) probability of flicker, given that it has either of the two
     modes : (6,) number of cosines fitted, at least those of a smooth course
@@ -116,10 +117,10 @@ class Wander:
         q, a, count = self._of_channel(channel)
         if not (q or a):
             return np.zeros(len(length))
-        # rows are of few lengths, but for the rounding of their times
+        # rows have few different lengths, except for rounding errors of their times
         few, at = np.unique(length.round(6), return_inverse=True)
-        walks = q**2 * _left_of_walk(self.length, few, count)
-        out: Array = (walks + a**2 * _left_of_flicker(self.length, few, count))[at]
+        walks = q**2 * _residual_of_walk(self.length, few, count)
+        out: Array = (walks + a**2 * _residual_of_flicker(self.length, few, count))[at]
         return out
 
     def residual_covariance(self, t: Array, length: Array) -> Array:
@@ -128,36 +129,39 @@ class Wander:
         out, diagonal = np.zeros((6, *y.shape)), np.s_[:: len(t) + 1]
         for c in range(6):
             q, a, count = self._of_channel(c)
-            alone = self.residual_variance(length, c)
-            if not alone.any():
+            variance = self.residual_variance(length, c)
+            if not variance.any():
                 continue
             k = np.arange(1, count + 1)
             waves = np.cos(np.multiply.outer(y, k))
             left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - waves @ (1 / k**2)
             out[c] = q**2 * self.length / np.pi**2 * left  # (3)
             if a:
-                every = -np.log(2 * np.sin(np.clip(y, MIN_PHASE, np.pi) / 2))
-                out[c] += a**2 / 2 * (every - waves @ (1 / k))  # (4)
-            out[c].flat[diagonal] = alone
+                all_cosines = -np.log(2 * np.sin(np.clip(y, MIN_PHASE, np.pi) / 2))
+                out[c] += a**2 / 2 * (all_cosines - waves @ (1 / k))  # (4)
+            out[c].flat[diagonal] = variance
         return out
 
     def _of_channel(self, channel: int) -> tuple[float, float, int]:
-        """Probable walk and flicker of a channel, and its number of cosines."""
+        """Walk q and flicker a of a channel, weighted by `share`, and its cosines."""
         share = float(self.share[channel])
         q = float(self.walk_rate[channel]) * (1 - share) ** 0.5
         return q, float(self.flicker[channel]) * share**0.5, int(self.modes[channel])
 
 
-def _left_of_walk(whole: float, length: Array, count: int) -> Array:
-    """Variance that cosines leave of means of a walk of 1 per sqrt(s), (n,)."""
+def _residual_of_walk(whole: float, length: Array, count: int) -> Array:
+    """Variance (1) of means over `length` (n,) s of a walk of 1 per sqrt(s), (n,).
+
+    `whole` is T, s, and `count` K.
+    """
     z, k = np.pi * length / whole, np.arange(1, count + 1)
     total = np.pi**2 / 6 - np.pi * z / 6 + z**2 / 24
     left: Array = np.maximum(total - _means(z, k) ** 2 @ k**-2.0, 0.0)  # (1)
     return whole / np.pi**2 * left
 
 
-def _left_of_flicker(whole: float, length: Array, count: int) -> Array:
-    """Variance that cosines leave of means of flicker with a = 1, (n,)."""
+def _residual_of_flicker(whole: float, length: Array, count: int) -> Array:
+    """Variance (2) of means over `length` (n,) s of flicker with a = 1, (n,)."""
     z, k = np.maximum(np.pi * length / whole, MIN_PHASE), np.arange(1, count + 1)
     taken = _means(z, k) ** 2 @ (1 / k)
     out: Array = np.maximum(1.5 - np.log(z) + z**2 / 144 - taken, 0.0) / 2  # (2)

@@ -1,22 +1,26 @@
 """Size of random walk and flicker of the biases within windows, before any fit.
 
-For three rows d, d', d'' of about the same length l, tau apart, the second difference
-does not contain a straight line, and has the variance
+Let d, d', d'' be three rows (means of one output) of about the same length l, s, whose
+middles are tau apart, s. A straight line cancels in their second difference, which has
+the variance
 
     var(d'' - 2 d' + d) = s''^2 + 4 s'^2 + s^2 + 4 D(tau) - D(2 tau)                (1)
 
-with s the white noise of a row and D(tau) the mean squared difference of two means tau
-apart: for a random walk of q per sqrt(s), and for flicker from cosines k of variance
-a^2 / k,
+s, s', s'' are the standard deviations of the rows by white noise. D(tau) is the mean
+squared difference of two means tau apart. For a random walk of q per sqrt(s), and for
+flicker with cosines k of variance a^2 / k, it is
 
     D = q^2 [tau - l / 3]                                                           (2)
     D = a^2 / 2 [(x + 1)^2 ln(x + 1) + (x - 1)^2 ln|x - 1| - 2 x^2 ln x]            (3)
 
-with x = tau / l. The size follows from the median of the squares over (1). The later
-half of each window is used, when settling after a turn is over. With r that median over
-the median of chi-squared, ln r has the standard deviation 2.7 / sqrt(n), with n the
-number of rows for white noise, and of rows that do not overlap for walks. Source: IEEE
-Std 952 and Barnes et al. 1971; (3) is the sum of their variances of averages.
+with x = tau / l. Each squared second difference is divided by its variance (1), and r
+is the median of these ratios over the median of chi-squared. At the true size r is near
+1, and ln r has the standard deviation 2.7 / sqrt(n). For white noise n is the number of
+rows; for walks it is the number of differences that do not overlap, which is used here.
+Only the later half of each window is used, because settling after a turn is over there.
+q, a, d and s are in units of the output.
+Source: IEEE Std 952 and Barnes et al. 1971; (3) is the sum of their variances of
+averages.
 """
 
 from __future__ import annotations
@@ -35,26 +39,28 @@ from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Scatter
 
 CHI2_MEDIAN, MEDIAN_LOG_SCATTER = 0.4549, 2.7
-"""Of chi squared with one degree of freedom: median; scatter of the median's ln."""
+"""Median of chi-squared with one degree of freedom; standard deviation of the log of a
+sample median over it, times the square root of the number of values."""
 
 VALUES_PER_SIZE = 4
 """Values of v for each value of `priors.SIZES`."""
 
 SIZES: Array = np.geomspace(priors.SIZES[0], priors.SIZES[-1], VALUES_PER_SIZE * 32 + 1)
+"""Values of v, in typical sizes, that are tried."""
 
 DENSITY: Array = (
     np.interp(np.log(SIZES), np.log(priors.SIZES), priors.density()) / VALUES_PER_SIZE
 )
-"""Probability of each."""
+"""Prior probability of each of `SIZES`."""
 
 DIFFERENCE_LAGS = (1, 3, 9)
-"""Distances of the three means of a difference, in rows."""
+"""Distances between neighbouring means of a second difference, in rows."""
 
 MIN_DIFFERENCES = 8
 """Least number of differences from which a size is estimated."""
 
 MIN_RATIO = 1e-12
-"""Of ratios, where a channel repeats one value."""
+"""Least ratio r, for channels that repeat one value and have differences of zero."""
 
 
 class Differences(NamedTuple):
@@ -62,101 +68,118 @@ class Differences(NamedTuple):
 
     Attributes
     ----------
-    squares : (n,) squares of the differences
-    white : (n,) variance from white noise
-    walks, flickers : (n,) further variance if q, or a, is 1
-    alone : number of differences that do not overlap
+    squares : (n,) squares of the differences, squared units of the output
+    white : (n,) their variance by white noise
+    unit_walk, unit_flicker : (n,) their further variance if q, or a, is 1
+    independent : number of differences that do not overlap
 
     """
 
     squares: Array
     white: Array
-    walks: Array
-    flickers: Array
-    alone: float
+    unit_walk: Array
+    unit_flicker: Array
+    independent: float
 
-    def scores(self, grown: Array, squares: Array) -> Array:
-        """Log likelihood of squared sizes (v,); `grown` (n,) is variance at size 1."""
-        known = self.squares / (self.white + np.multiply.outer(squares, grown))
-        ratio = np.maximum(np.median(known, axis=1) / CHI2_MEDIAN, MIN_RATIO)
-        out: Array = -self.alone / 2 * (np.log(ratio) / MEDIAN_LOG_SCATTER) ** 2
+    def scores(self, unit_variance: Array, squared_sizes: Array) -> Array:
+        """Log likelihood of squared sizes (v,), (v,).
+
+        `unit_variance` (n,) is `unit_walk` or `unit_flicker`.
+        """
+        variance = self.white + np.multiply.outer(squared_sizes, unit_variance)
+        median = np.median(self.squares / variance, axis=1)
+        ratio = np.maximum(median / CHI2_MEDIAN, MIN_RATIO)
+        out: Array = -self.independent / 2 * (np.log(ratio) / MEDIAN_LOG_SCATTER) ** 2
         return out
 
 
 def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
     """Sizes of random walk, per sqrt(s), and flicker of each output, (6,) each.
 
-    Root mean squares over all sizes, including zero, weighted by their probabilities.
-    The third result is the probability of flicker, (6,), given that an output has
-    either. Few windows have flicker as a permanent group, so here it is zero.
-    `unit` (6,) are outputs per SI unit.
+    Both are root mean squares over all sizes, including zero, weighted by their
+    probabilities. The third result is the probability that an output has flicker, (6,),
+    given that it has a random walk or flicker. With fewer than `MIN_WINDOWS` windows,
+    flicker is a permanent group of the model; its size here is then zero. `unit` (6,)
+    are outputs per SI unit.
     """
-    walk, chance = _walk(rows)
+    walk, walk_chance = _typical_walk(rows)
     flicker = np.repeat([priors.FLICKER_ACC, priors.FLICKER_GYR], 3)
     out, evidence = np.zeros((2, 6)), np.zeros((2, 6))
     few = len(np.unique(rows.x.position)) < MIN_WINDOWS
     for _, triad in TRIADS:
         at = list(triad)
-        seen = [
+        differences = [
             [d for lag in DIFFERENCE_LAGS for d in _differences(rows, c, lag)]
             for c in at
         ]
-        by = WanderHypotheses(walk[at] * unit[at], chance, priors.SINGLE_AXIS_SHARE)
-        out[0, at], evidence[0, at] = by.sizes(
-            [[(d, d.walks) for d in some] for some in seen]
+        walks = WanderHypotheses(
+            walk[at] * unit[at], walk_chance, priors.SINGLE_AXIS_SHARE
+        )
+        out[0, at], evidence[0, at] = walks.sizes(
+            [[(d, d.unit_walk) for d in of_axis] for of_axis in differences]
         )
         if few:
             evidence[1, at] = -np.inf
             continue
-        by = WanderHypotheses(flicker[at] * unit[at], priors.FLICKER_CHANCE, 0.0)
-        out[1, at], evidence[1, at] = by.sizes(
-            [[(d, d.flickers) for d in some] for some in seen]
+        flickers = WanderHypotheses(flicker[at] * unit[at], priors.FLICKER_CHANCE, 0.0)
+        out[1, at], evidence[1, at] = flickers.sizes(
+            [[(d, d.unit_flicker) for d in of_axis] for of_axis in differences]
         )
     return out[0], out[1], probability_of_log_odds(evidence[1] - evidence[0])
 
 
 class WanderHypotheses(NamedTuple):
-    """Hypotheses: all axes of a triad wander, one axis alone, or none.
+    """Hypotheses: all axes of a triad wander, one axis alone wanders, or none does.
 
     Attributes
     ----------
-    typical : (3,) size of each axis at v = 1
-    chance : prior probability that axes wander
-    alone : part of it that only one axis does
+    typical : (3,) size of each axis at v = 1, in units of the output
+    wander_chance : prior probability that all axes wander
+    single_axis_share : prior probability of each single axis, as a part of that
 
     """
 
     typical: Array
-    chance: float
-    alone: float
+    wander_chance: float
+    single_axis_share: float
 
     def sizes(
-        self, seen: Sequence[Sequence[tuple[Differences, Array]]]
+        self, differences: Sequence[Sequence[tuple[Differences, Array]]]
     ) -> tuple[Array, float]:
-        """Root mean square size of each axis, and log evidence that it is not zero.
+        """Root mean square size of each axis, (3,), and log evidence of any wandering.
 
-        `seen` has, for each axis, differences with their variance at size 1.
+        `differences` has a list for each axis: differences with their variance (n,) at
+        size 1.
         """
         square = np.append(0.0, SIZES) ** 2
-        every = np.zeros((3, len(square)))
-        for one, typical, score in zip(seen, self.typical, every, strict=True):
-            for d, grown in one:
-                score += d.scores(grown, square * typical**2)
-        nothing, own = every[:, 0], every[:, 1:]
-        others = nothing.sum() - nothing
-        together = own.sum(axis=0) + np.log(self.chance * DENSITY)
-        with np.errstate(divide="ignore"):  # none of one axis alone
-            alone = own + others[:, None] + np.log(self.chance * self.alone * DENSITY)
-        none = nothing.sum() + np.log(1 - self.chance)
-        total = np.logaddexp.reduce([none, *together, *alone.ravel()])
-        weight = np.exp(together - total) + np.exp(alone - total)
+        likelihood = np.zeros((3, len(square)))
+        for of_axis, typical, score in zip(
+            differences, self.typical, likelihood, strict=True
+        ):
+            for d, unit_variance in of_axis:
+                score += d.scores(unit_variance, square * typical**2)
+        at_zero, at_sizes = likelihood[:, 0], likelihood[:, 1:]
+        other_axes_at_zero = at_zero.sum() - at_zero
+        all_axes = at_sizes.sum(axis=0) + np.log(self.wander_chance * DENSITY)
+        with np.errstate(divide="ignore"):  # a share of zero has the log -inf
+            single_axis = (
+                at_sizes
+                + other_axes_at_zero[:, None]
+                + np.log(self.wander_chance * self.single_axis_share * DENSITY)
+            )
+        no_axis = at_zero.sum() + np.log(1 - self.wander_chance)
+        total = np.logaddexp.reduce([no_axis, *all_axes, *single_axis.ravel()])
+        weight = np.exp(all_axes - total) + np.exp(single_axis - total)
         out = self.typical * np.sqrt(weight @ square[1:])
-        something = float(np.logaddexp.reduce([*together, *alone.ravel()]))
-        return np.where([bool(one) for one in seen], out, 0.0), something
+        any_axis = float(np.logaddexp.reduce([*all_axes, *single_axis.ravel()]))
+        return np.where([bool(of_axis) for of_axis in differences], out, 0.0), any_axis
 
 
-def _walk(rows: Rows) -> tuple[Array, float]:
-    """Typical walk of each channel, (6,), and its prior, by the catalogue."""
+def _typical_walk(rows: Rows) -> tuple[Array, float]:
+    """Typical random walk of each channel, (6,), SI per sqrt(s), and its probability.
+
+    Both are those of the effect in the catalogue that is a random walk of all outputs.
+    """
     (effect,) = (
         e
         for e in catalogue().values()
@@ -166,11 +189,11 @@ def _walk(rows: Rows) -> tuple[Array, float]:
 
 
 def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
-    """Differences of one channel in the later halves of windows; none if too few."""
+    """Differences of channel c at a lag, in rows; none if there are too few."""
     at = _later_half(rows, 2 * lag)
     y, sd, t = rows.y[:, c], rows.sd[:, c], rows.x.t
-    known = rows.used[:, c]
-    at = at[known[at] & known[at + lag] & known[at + 2 * lag]]
+    used = rows.used[:, c]
+    at = at[used[at] & used[at + lag] & used[at + 2 * lag]]
     if len(at) < MIN_DIFFERENCES:
         return
     length, tau = rows.length[at + lag], (t[at + 2 * lag] - t[at]) / 2
@@ -185,22 +208,22 @@ def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
 
 
 def _flicker_structure(x: Array) -> Array:
-    """Mean squared difference of two means of flicker with a = 1, x lengths apart."""
+    """D of (3) for a = 1: two means x of their lengths apart."""
     out: Array = (_squared_ln(x + 1) + _squared_ln(x - 1)) / 2 - _squared_ln(x)  # (3)
     return out
 
 
 def _squared_ln(x: Array) -> Array:
-    """x^2 ln x, 0 at 0."""
+    """x^2 ln x; 0 at x = 0."""
     out: Array = x**2 * np.log(np.maximum(x, 1e-12))
     return out
 
 
 def _later_half(rows: Rows, ahead: int) -> Index:
-    """Rows of the later half of each window that have another one so far ahead."""
+    """Rows in the later half of their window, with a row of it `ahead` rows later."""
     position = rows.x.position
-    near = np.flatnonzero(position[ahead:] == position[:-ahead])
-    first = np.searchsorted(position, position[near])
-    count = np.searchsorted(position, position[near], side="right") - first
-    out: Index = near[2 * (near - first) >= count - 1]
+    at = np.flatnonzero(position[ahead:] == position[:-ahead])
+    first = np.searchsorted(position, position[at])
+    count = np.searchsorted(position, position[at], side="right") - first
+    out: Index = at[2 * (at - first) >= count - 1]
     return out

@@ -1,4 +1,4 @@
-"""Roots of matrices that may be singular but for rounding."""
+"""Triangular roots of matrices that rounding errors may make indefinite."""
 
 from __future__ import annotations
 

@@ -50,10 +50,12 @@ class Gram:
     square, count : (y - h)^T R^-1 (y - h) of the same, and their degrees of freedom
     means : (p, 6, k) columns' means in each window
     residual : (p, 6) mean of y - h
-    info : (p, 6) information on each mean, 0 where nothing was measured
+    info : (p, 6) information on each mean by white noise, 1 / variance; 0 where nothing
+        was measured
     shared : (p, 6) standard deviation of known errors that all rows of a window share
     free_rotations : (p, 6, 2) A_p, derivative of the means by free rotations
-    kind : (p, 6) index of the instability of each mean; turns' closures have their own
+    kind : (p, 6) index 0 to 6 of the instability of each mean; closures of turns have
+        an instability of their own (`CLOSURE`)
     closure_errors : (p, 6, 6) error of a closure for an instability of one, by channel
     index : (all,) place of each column of the dictionary here, -1 if absent
 
@@ -114,19 +116,22 @@ class Gram:
                 self, (full @ self.means)[known],
                 (full @ self.residual[:, :, None])[known, 0], own, full, float(log_det),
             )  # fmt: skip
-        spread = self._spread(tau)
-        weight = self.info / (1 + self.info * spread)
-        log_det = np.log1p(self.info * spread).sum()
+        variance = self._shared_variance(tau)
+        weight = self.info / (1 + self.info * variance)
+        log_det = np.log1p(self.info * variance).sum()
         root = np.sqrt(weight[known])
         white: Array = self.means[known] * root[:, None]
         residual: Array = self.residual[known] * root
         return WeightedGram(self, white, residual, weight, np.zeros(0), float(log_det))
 
-    def _spread(self, tau: Array) -> Array:
-        """Variance of the means beside white noise, by channel, (..., p, 6)."""
-        wide = tau**2
-        bent = np.einsum("pij,...j->...pi", self.closure_errors**2, wide[..., :6])
-        out: Array = self.shared**2 + wide[..., self.kind] + bent
+    def _shared_variance(self, tau: Array) -> Array:
+        """Variance of the means in addition to white noise, by channel, (..., p, 6).
+
+        `tau` (..., 7) are the instabilities.
+        """
+        square = tau**2
+        closures = np.einsum("pij,...j->...pi", self.closure_errors**2, square[..., :6])
+        out: Array = self.shared**2 + square[..., self.kind] + closures
         return out
 
     def whitening(self, tau: Array) -> tuple[Array, Array]:
@@ -138,7 +143,7 @@ class Gram:
         both = known[:, :, None] & known[:, None, :]
         scale = np.sqrt(self.info)
         cov = self.free_rotations @ np.swapaxes(self.free_rotations, 1, 2)
-        inner = cov + np.eye(6) * self._spread(tau)[..., None]
+        inner = cov + np.eye(6) * self._shared_variance(tau)[..., None]
         inner = np.where(both, inner * scale[:, :, None] * scale[:, None, :], 0.0)
         inner[..., range(6), range(6)] += 1.0
         lower = np.linalg.cholesky(inner)
@@ -169,7 +174,7 @@ class WeightedGram:
     log_det: float
 
     def matrix(self, one: Index, other: Index | None) -> Array:
-        """Phi^T R^-1 Phi of columns `one` and `other`; all columns if that is None."""
+        """Phi^T R^-1 Phi between columns `one` and `other`; None stands for all."""
         rows = self.gram.index[one]
         white = self.white[:, rows]
         if other is None:
@@ -178,7 +183,7 @@ class WeightedGram:
             return out
         columns = self.gram.index[other]
         out = self.gram.within[np.ix_(rows, columns)]
-        # of a product with itself, which is symmetric, half is calculated
+        # numpy calculates only half of the product of a matrix with itself
         out += white.T @ (white if one is other else self.white[:, columns])
         return out
 
@@ -279,7 +284,10 @@ class Eliminated:
     def schur_complement_of_means(
         self, kind: int, typical: float
     ) -> tuple[Array, Array]:
-        """The same for offsets of single means of one kind of instability."""
+        """The same for an offset of each mean of one kind of instability.
+
+        `kind` is its index 0 to 6, `typical` the typical size of the offsets.
+        """
         white = self.rows.shared(kind) * typical
         ours = self.rows.white[:, self.rows.gram.index[self.columns]]
         shared = ours.T @ white
@@ -320,11 +328,11 @@ def gains_from_eigenvalues(
 ) -> Array:
     """Gain (3) at some sizes, from lambda and q^2, (..., k) each."""
     square = sizes**2
-    # sizes last: sums along an axis of three cost more than what is summed
-    one = strength[..., None] * square
-    one += 1
+    # sizes are the last axis: numpy is slow at sums over a last axis of few elements
+    ratio = strength[..., None] * square
+    ratio += 1
     gain = power[..., None] * square
-    gain /= one
-    gain -= np.log(one, out=one)
+    gain /= ratio
+    gain -= np.log(ratio, out=ratio)
     total: Array = 0.5 * gain.sum(axis=-2)
     return total

@@ -44,7 +44,7 @@ class InstabilityScan:
     score : (n,) ln Z, (3)
     sizes, root, seen : (n, a), (n, a, a), (n, a) S, L and l
     inner, rhs : (n, w, k, k), (n, w, k) M' and c' of blocks of further columns, (4)
-    alone : (n, w, k) squares of these columns before the set is eliminated
+    diagonal : (n, w, k) diagonal of M of these columns, before the set is eliminated
 
     """
 
@@ -54,7 +54,7 @@ class InstabilityScan:
     seen: Array
     inner: Array
     rhs: Array
-    alone: Array
+    diagonal: Array
 
     def posterior(self) -> tuple[Array, Array]:
         """Mean (n, a) and covariance (n, a, a) of the set's columns."""
@@ -78,16 +78,18 @@ def scan_instabilities(
 
     """
     sizes = np.broadcast_to(sizes, (len(taus), len(columns)))
-    every = np.concatenate([columns, further.ravel()])
+    all_columns = np.concatenate([columns, further.ravel()])
     moved = _affected_means(gram, np.flatnonzero(np.ptp(taus, axis=0)))
     still = replace(gram, info=np.where(moved, 0.0, gram.info)).with_instability(
         taus[0]
     )
-    common = _joint_gram(still, every)
+    common = _joint_gram(still, all_columns)
     windows: NDArray[np.bool_] = np.any(moved, axis=1)
     reduced = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
     table = np.append(
-        reduced.means[:, :, reduced.index[every]], reduced.residual[..., None], axis=2
+        reduced.means[:, :, reduced.index[all_columns]],
+        reduced.residual[..., None],
+        axis=2,
     )
     rows, width = int(moved.sum()), len(common)
     step = max(1, MAX_NUMBERS // (width * (rows + width)))
@@ -139,11 +141,11 @@ def _eliminate(total: Array, sizes: Array, shape: tuple[int, ...]) -> Instabilit
     score -= np.log(np.diagonal(root, 0, 1, 2)).sum(axis=1)
     at = a + np.arange(int(np.prod(shape))).reshape(shape)
     own, rhs = total[:, at[:, :, None], at[:, None, :]], total[:, at, -1]
-    alone = np.diagonal(own, 0, 2, 3)
+    diagonal = np.diagonal(own, 0, 2, 3)
     if at.size:
         taken = np.linalg.solve(root, total[:, :a, a:-1] * sizes[..., None])
         taken = np.moveaxis(taken.reshape(n, a, *shape), 1, 2)  # (n, w, a, k)
         turned = np.swapaxes(taken, 2, 3)
         own = own - turned @ taken
         rhs = rhs - (turned @ projected[:, None, :, None])[..., 0]
-    return InstabilityScan(score, sizes, root, projected, own, rhs, alone)
+    return InstabilityScan(score, sizes, root, projected, own, rhs, diagonal)

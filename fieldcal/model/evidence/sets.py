@@ -7,8 +7,8 @@ for the width of the posterior of each size,
 
 and its weight is the evidence times the prior probability of each of its causes. What
 is always present, such as an instability, has a size as well. That size is estimated
-again for every set: if it stayed at its value without a cause, it would explain
-everything that the cause explains.
+again for every set. If an instability kept the size that it needs without any cause, it
+would explain everything that a cause could explain.
 """
 
 from __future__ import annotations
@@ -83,9 +83,11 @@ def is_function(member: Member) -> bool:
 def variant_log_priors(cause: Cause, others: Iterable[Member]) -> Array:
     """Log prior probability of a cause, given others in the set.
 
-    One value for each variant, or () if all variants have the same. A cause that begins
-    at an instant is likelier if it does so on both triads at once, above all where the
-    device may have been off. A device that was never calibrated has all usual causes.
+    An array with one value for each variant, or of shape () if all variants have the
+    same. A cause that begins at an instant is likelier if it begins on both triads at
+    the same instant, above all when the device may have been switched off. If one usual
+    cause is in the set, the device was probably never calibrated, and the other usual
+    causes are likelier.
     """
     share = np.array(np.log(cause.chance / len(cause.variants)))
     if cause.expected:
@@ -120,8 +122,8 @@ class Sets:
     Attributes
     ----------
     visited : evaluated sets by their keys
-    corrections : what to add to the score of sets whose own state is far from that of
-        the Gram matrix, by the keys of their causes in the state
+    corrections : difference to add to the score of a set whose own base state is far
+        from that of the Gram matrix, by the keys of its causes in the state
 
     """
 
@@ -133,7 +135,7 @@ class Sets:
         )
         self.visited: dict[SetKey, Set] = {}
         self.corrections: dict[frozenset[str], float] = {}
-        self._weighed: dict[tuple[int, ...], WeightedGram] = {}
+        self._weighted: dict[tuple[int, ...], WeightedGram] = {}
 
     @staticmethod
     def key(members: Iterable[Member]) -> SetKey:
@@ -170,13 +172,13 @@ class Sets:
 
     def gram_at(self, instability: tuple[int, ...]) -> WeightedGram:
         """The Gram matrix weighted with the instabilities of some indices; cached."""
-        if instability not in self._weighed:
+        if instability not in self._weighted:
             tau = self.instability_sigma(instability)
-            self._weighed[instability] = self.gram.with_instability(tau)
-        return self._weighed[instability]
+            self._weighted[instability] = self.gram.with_instability(tau)
+        return self._weighted[instability]
 
     def instability_sigma(self, instability: Sequence[int]) -> Array:
-        """Standard deviation of the instability of some indices, (7,)."""
+        """Standard deviation (7,) of instabilities, from indices in `priors.SIZES`."""
         sigma: Array = priors.SIZES[list(instability)] * self.typical_instability
         return sigma
 

@@ -10,7 +10,7 @@ from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sizing import LOG_DENSITY, LOG_SIZE_STEP, gain_terms
 
 REFINED_SIZES = 129
-"""Number of sizes that are tried between the neighbours of a size."""
+"""Number of sizes that are tried between the neighbours of a size of the grid."""
 
 
 MIN_SIZE_INFORMATION = 0.1
@@ -20,7 +20,9 @@ MIN_SIZE_INFORMATION = 0.1
 def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
     """Most probable size of a group, and standard uncertainty of its logarithm.
 
-    The information on ln v is that of the shares lambda v^2 / (1 + lambda v^2).
+    `at` are the indices of its columns in the state, `v` its size there. The
+    information on ln v is twice the sum of the squares of the shares lambda v^2 /
+    (1 + lambda v^2), lambda of (3) of `gram`.
     """
     strength, power = gain_terms(state, at, v)
     near = v * np.exp(np.linspace(-LOG_SIZE_STEP, LOG_SIZE_STEP, REFINED_SIZES))
@@ -35,12 +37,13 @@ def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, f
 def most_probable_axis_size(
     state: Eliminated, at: Index, v: float, triad: tuple[float, float]
 ) -> tuple[float, float]:
-    """The same for one axis of a group, whose size is v in a set.
+    """The same for a single axis of a triad that has the size v in the state.
 
-    The axes are similar within `UNLIKE`; `triad` is the result for all of them.
+    The sizes of the axes differ by `priors.AXES_LOG_SPREAD`, ln, about that of the
+    triad; `triad` is the result of `most_probable_size` for the triad.
     """
     strength, power = gain_terms(state, at, v)
-    middle, part = triad
+    middle, middle_sigma = triad
     distance = np.linspace(-4.0, 4.0, REFINED_SIZES)
     near = middle * np.exp(priors.AXES_LOG_SPREAD * distance)
     top = int(
@@ -48,6 +51,6 @@ def most_probable_axis_size(
     )
     best = float(near[top])
     share = best**2 * strength / (1 + best**2 * strength)
-    alike = priors.AXES_LOG_SPREAD**-2
-    info = alike + 2 * float((share**2).sum())
-    return best, float(np.hypot(info**-0.5, alike / info * part))
+    prior_info = priors.AXES_LOG_SPREAD**-2
+    info = prior_info + 2 * float((share**2).sum())
+    return best, float(np.hypot(info**-0.5, prior_info / info * middle_sigma))

@@ -3,9 +3,9 @@
 Once a set is eliminated with sizes v_0, its covariance gives the evidence at any other
 size of one group: with C = U diag(c) U^T the posterior covariance of the group in units
 of its prior covariance, lambda = (1 / c - 1) / v_0^2 and q = U^T u / (c v_0) are those
-of (3) of `gram`. The same holds for the instability that means of windows share: with
-S = U diag(s) U^T the information on the means with tau, s / (1 - tau^2 s) is that
-without.
+of (3) of `gram`. The same holds for an instability tau of the means of windows: if the
+information on the means with tau has the eigenvalues s, that without tau has the
+eigenvalues s / (1 - tau^2 s).
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ Member = tuple[Cause, Group]
 class Sizes:
     """Indices in `priors.SIZES`.
 
-    `calibration` of the always-there groups, `instability` of the channels and the
-    turns, and `members` of the causes, in their order.
+    `calibration` of the groups that are always present, `instability` of the six
+    channels and of closures, `members` of the causes of a set, in their order.
     """
 
     calibration: tuple[int, ...]
@@ -274,14 +274,14 @@ class Sizing:
         distance = (
             np.subtract.outer(index, index) * LOG_SIZE_STEP / priors.AXES_LOG_SPREAD
         )
-        best = [gain - 0.5 * distance**2 for gain in separate]  # by middle, size
-        total = sum(b.max(axis=1) for b in best) + INSTABILITY_LOG_DENSITY
+        by_middle = [gain - 0.5 * distance**2 for gain in separate]  # (middle, size)
+        total = sum(b.max(axis=1) for b in by_middle) + INSTABILITY_LOG_DENSITY
         middle = int(np.argmax(total))
-        for c, one in zip(channels, best, strict=True):
-            self.instability[c] = int(np.argmax(one[middle]))
+        for c, of_channel in zip(channels, by_middle, strict=True):
+            self.instability[c] = int(np.argmax(of_channel[middle]))
         return [
-            self._profile_with_prior(c, channels, one)
-            for c, one in zip(channels, separate, strict=True)
+            self._profile_with_prior(c, channels, gain)
+            for c, gain in zip(channels, separate, strict=True)
         ]
 
     def _profile_with_prior(
@@ -291,9 +291,9 @@ class Sizing:
 
         `gain` is its gain. The others among `channels`, which are similar, are fixed.
         """
-        every = np.tile([float(self.instability[i]) for i in channels], (len(gain), 1))
-        every[:, channels.index(c)] = np.arange(len(gain))
-        return gain + triad_log_prior(every)
+        sizes = np.tile([float(self.instability[i]) for i in channels], (len(gain), 1))
+        sizes[:, channels.index(c)] = np.arange(len(gain))
+        return gain + triad_log_prior(sizes)
 
     def _channel_gain(self, c: int) -> Array:
         """Gain over the instabilities of one channel, the others fixed; cached."""

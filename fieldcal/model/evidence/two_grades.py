@@ -1,10 +1,11 @@
-"""How large each kind of error is in a device that may be of either of two grades.
+"""Probable size of each kind of error in a device that may be of either of two grades.
 
-Biases that no unit of the stated grade has make the errors of a coarser one likely, and
-not certain: gyroscopes that are 5 deg/s off come with accelerometers as straight as
-those of tactical grade. Each kind of error has the size s_1 of the stated grade or s_2
-of the coarser one. The rows tell which, as they tell any size: with gain(v) by (3) of
-`gram` and the chances of both before the rows are seen,
+Biases larger than the stated grade allows make the errors of a coarser grade likely,
+but not certain: a device with gyroscope biases of 5 deg/s may have accelerometers as
+linear as those of tactical grade. Each kind of error has the size s_1 of the stated
+grade or s_2 of the coarser one. With gain(v) by (3) of `gram`, and the prior
+probability AS_STATED of the stated grade, the probabilities of the two sizes have the
+ratio
 
     p_2 / p_1 = exp[gain(s_2) - gain(s_1)] (1 - AS_STATED) / AS_STATED             (1)
 """
@@ -24,8 +25,8 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sizing import gain_terms
 
-STRAIGHT = ("quadratic", "scale_asymmetry", "cubic")
-"""Effects that share one size of `FactoryErrors`: a curve of unknown shape."""
+NONLINEARITIES = ("quadratic", "scale_asymmetry", "cubic")
+"""Effects that share one size of `FactoryErrors`: a nonlinearity of unknown shape."""
 
 
 def chances_of_coarser(
@@ -55,7 +56,7 @@ def chances_of_coarser(
 def _kinds(groups: Sequence[Group]) -> Iterator[tuple[str, Index]]:
     """The columns of each size of `FactoryErrors`, by its name."""
     for kind in (field.name for field in fields(FactoryErrors)):
-        names = STRAIGHT if kind in STRAIGHT else (kind,)
+        names = NONLINEARITIES if kind in NONLINEARITIES else (kind,)
         columns = [g.columns for g in groups if g.part in names]
         columns += [_of_biases(g, kind) for g in groups if g.part in WARMING_EFFECTS]
         yield kind, np.concatenate([np.empty(0, dtype=np.intp), *columns])

@@ -112,7 +112,9 @@ class HeldOut:
 
         Empty if a part cannot be predicted.
         """
-        every = gram(self.linear, self.dictionary, self.fitted.values, (), self.columns)
+        all_rows = gram(
+            self.linear, self.dictionary, self.fitted.values, (), self.columns
+        )
         rests = [self._without(int(i)) for i in np.unique(self.fold)]
         if not self.fold.max() or None in rests:
             return
@@ -120,7 +122,7 @@ class HeldOut:
             fitted = sets.evaluate(candidate.members, candidate.sizes)
             tau = sets.instability_sigma(fitted.sizes.instability)
             rest = fitted.state
-            whole = every.with_instability(tau)
+            whole = all_rows.with_instability(tau)
             yield Eliminated.of(whole, rest.columns, rest.prior_sigma), rest
 
     def _without(self, i: int) -> Sets | None:
@@ -141,7 +143,7 @@ def held_out_residuals(fitted: FittedSet, sets: Sequence[Set]) -> Array:
 
 
 def candidate_sets(best: Set, visited: Sequence[Set]) -> list[Set]:
-    """Sets that may be the best without a part: those near the best, and the empty."""
+    """Sets that may be the best without a part: the best, those near it, the empty."""
     ranked = sorted(visited, key=lambda s: -s.score)
     near = [s for s in ranked if s.score > best.score - MAX_LOG_DISTANCE]
     none = [s for s in ranked if not s.members]
@@ -149,7 +151,7 @@ def candidate_sets(best: Set, visited: Sequence[Set]) -> list[Set]:
 
 
 def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Array:
-    """Held-out residuals of turns, whitened: each predicted from windows and others."""
+    """Whitened held-out residuals of turns, from the windows and the other turns."""
     d, out = fitted.dictionary, []
     columns = _columns(d, [fitted.set]) | (fitted.values != 0)
     linear = [_select_columns(part, columns) for part in fitted.linear]
@@ -185,12 +187,13 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
 
 
 def _residual_square(eliminated: Eliminated) -> float:
-    """Q, the weighted residual square plus the prior square of the estimate."""
+    """Q of `squares`: weighted squares of the residuals, and of u by its prior."""
     rhs = eliminated.rows.rhs(eliminated.columns)
     return eliminated.rows.square - float(rhs @ eliminated.estimate)
 
 
 def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
+    """Columns of some sets and all rotations of positions, (all,)."""
     out = np.zeros(d.width, dtype=bool)
     for candidate in sets:
         out[candidate.state.columns] = True
@@ -226,10 +229,10 @@ def _predict(
         a, z = [], []
         for part in left:
             rows = part.window == j
-            some = np.isin(part.columns, at)
+            angles = np.isin(part.columns, at)
             design = np.zeros((int(rows.sum()), 2))
-            place = np.searchsorted(at, part.columns[some])
-            design[:, place] = part.design[np.ix_(rows, some)]
+            place = np.searchsorted(at, part.columns[angles])
+            design[:, place] = part.design[np.ix_(rows, angles)]
             a.append(design * size)
             z.append(white[part.channel][rows])
         flat = np.concatenate(a)

@@ -8,8 +8,8 @@ mixture,
     mean = sum_h P(h) mean_h,    cov = sum_h P(h) [cov_h + off_h off_h^T],
     off_h = mean_h - mean
 
-so with few degrees of freedom an interval is as wide as that of Student's t. It is also
-wide where a window may be bad; a window that is certainly bad has no weight.
+With few degrees of freedom the intervals are thus as wide as those of Student's t. They
+are also wider if a window may be bad; a window that is certainly bad has no weight.
 
 Source: Bayesian model averaging; for windows, Cook and Weisberg 1982, 2.1.
 """
@@ -37,16 +37,18 @@ from fieldcal.model.evidence.sizing import (
 )
 
 MAX_LOG_DISTANCE = 4.0
-"""Evidence behind the best, ln, from which a hypothesis no longer counts: 55 to 1."""
+"""Difference of log evidence to the best, beyond which a hypothesis is omitted: odds of
+1 to 55."""
 
 GIVEN_SET_LOG_DENSITY = np.log(priors.instability_density_of_given_set())
-"""Log prior of instabilities if no causes were searched: others may scatter windows."""
+"""Log prior of instabilities if no causes were searched for: then causes that are not
+in the set may add to the scatter of windows."""
 
 NONE: Index = np.empty((0, 1), dtype=np.intp)
 """No columns."""
 
 MIN_INSTABILITY = 0.2
-"""Instability below which it is not distinguishable, in the noise of a mean."""
+"""Smallest instability that is distinguishable, in units of the noise of a mean."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,8 @@ class Mixture:
     mean, covariance : (k,), (k, k)
     prior_sigma : (k,) standard deviation of each before the rows are seen
     bad : (p,) probability that a window is bad
-    scatter : (7,) rms of what each channel wanders from window to window
+    scatter : (7,) rms instability of each channel from window to window, and of
+        closures, units of the output and rad
     score : ln of the evidence of the set
 
     """
@@ -104,7 +107,7 @@ class Mixing:
     Parameters
     ----------
     dictionary, gram : columns, and their Gram matrix about the set's own state
-    there : the set at its most probable sizes
+    fitted : the set at its most probable sizes
     typical_instability : (7,) typical instability, 0 where there is none
     given : whether the set is given and not found by a search: then windows may be bad,
         or be scattered by unknown causes
@@ -121,7 +124,7 @@ class Mixing:
         given: bool = True,
         doubt: bool = True,
     ) -> None:
-        self.dictionary, self.there, self.typical_instability = (
+        self.dictionary, self.fitted, self.typical_instability = (
             dictionary,
             fitted,
             typical_instability,
@@ -131,7 +134,7 @@ class Mixing:
             dictionary, gram, typical_instability, fitted.members, fitted.sizes
         )
         self.columns, self.prior_sigma = sizing.columns, fitted.state.prior_sigma
-        self.doubted = self._doubted() if given and doubt else []
+        self.doubted = self._doubted_windows() if given and doubt else []
         more = [at for _, at in self.doubted]
         self.gram = gram.select_columns(np.concatenate([self.columns, *more]))
         self.bad = np.zeros(len(dictionary.window_positions))
@@ -148,7 +151,7 @@ class Mixing:
         )
         score, means, covariances = self._combine_exactly(near, tau)
         score += instability_log_prior(
-            self.there.sizes.instability, self.typical_instability, self.density
+            self.fitted.sizes.instability, self.typical_instability, self.density
         )
         total = float(np.logaddexp.reduce(score))
         weight = np.exp(score - total)
@@ -160,7 +163,7 @@ class Mixing:
             self.columns, mean, covariance, self.prior_sigma, self.bad, scatter, total
         )
 
-    def _doubted(self) -> list[tuple[int, Index]]:
+    def _doubted_windows(self) -> list[tuple[int, Index]]:
         """Windows that may be bad by the accelerometers, with their columns."""
         d = self.dictionary
         observed = [c for c in d.observed if c < 3]
@@ -172,36 +175,43 @@ class Mixing:
 
     def _triad_hypotheses(self, triad: Sequence[int]) -> list[Hypothesis]:
         """Hypotheses about one triad that count, the other triads fixed."""
-        mode = self.there.sizes.instability
+        mode = self.fitted.sizes.instability
         first = Hypothesis(mode, -1, 0, 0.0, 0.0)
         if not self.typical_instability[list(triad)].any():
             return [first]
-        sizes, known = self._shifted(triad)
+        sizes, log_priors = self._shifted(triad)
         doubted = self._bad_columns() if triad[0] == 0 and self.doubted else NONE
         taus = priors.SIZES[np.array(sizes)] * self.typical_instability
         scan = scan_instabilities(
             self.gram, self.columns, self.prior_sigma, taus, doubted
         )
-        alone = scan.score + known
+        without_bad = scan.score + log_priors
         hypotheses = [
             Hypothesis(s, -1, 0, k, v)
-            for s, k, v in zip(sizes, known.tolist(), alone.tolist(), strict=True)
+            for s, k, v in zip(
+                sizes, log_priors.tolist(), without_bad.tolist(), strict=True
+            )
         ]
         if len(doubted):
             log_prior = (
-                known[:, None] + float(np.log(priors.BAD_WINDOW_CHANCE)) + LOG_DENSITY
+                log_priors[:, None]
+                + float(np.log(priors.BAD_WINDOW_CHANCE))
+                + LOG_DENSITY
             )  # (n, v)
-            every = (
-                self._with_bad(scan) + scan.score[:, None, None] + log_prior[:, None]
-            )
-            each = np.logaddexp.reduce(every, axis=(0, 2))
-            self.bad = np.exp(each - np.logaddexp.reduce([*alone, *each]))
+            with_bad = (
+                self._bad_window_gains(scan)
+                + scan.score[:, None, None]
+                + log_prior[:, None]
+            )  # (n, w, v)
+            by_window = np.logaddexp.reduce(with_bad, axis=(0, 2))
+            total = np.logaddexp.reduce([*without_bad, *by_window])
+            self.bad = np.exp(by_window - total)
             hypotheses += [
                 Hypothesis(
-                    sizes[n], i, v, float(log_prior[n, v]), float(every[n, i, v])
+                    sizes[n], i, v, float(log_prior[n, v]), float(with_bad[n, i, v])
                 )
                 for n, i, v in np.argwhere(
-                    every > alone.max() - MAX_LOG_DISTANCE
+                    with_bad > without_bad.max() - MAX_LOG_DISTANCE
                 ).tolist()
             ]
         best = max(h.score for h in hypotheses)
@@ -213,7 +223,7 @@ class Mixing:
         Log priors are relative to the most probable instability. Those too small to be
         distinguished are combined into one.
         """
-        mode = self.there.sizes.instability
+        mode = self.fitted.sizes.instability
         middle = round(float(np.mean([mode[c] for c in triad])))
         top = len(priors.SIZES) - 1
         moved = [
@@ -240,16 +250,16 @@ class Mixing:
         """Columns of the windows that may be bad, (w, k)."""
         return np.array([at for _, at in self.doubted])
 
-    def _with_bad(self, scan: InstabilityScan) -> Array:
+    def _bad_window_gains(self, scan: InstabilityScan) -> Array:
         """Gains if a window is bad, by instability, window and size, (n, w, v)."""
         typical = self._typical(self.doubted[0][1])
         inner = scan.inner * typical * typical[:, None]
-        own = (scan.alone * typical**2).max(axis=-1)
+        own = (scan.diagonal * typical**2).max(axis=-1)
         return evidence_gains(inner, scan.rhs * typical, own)
 
     def _sizes_of(self, parts: Hypotheses) -> list[int]:
         """Instabilities of hypotheses of each triad together, (7,)."""
-        sizes = list(self.there.sizes.instability)
+        sizes = list(self.fitted.sizes.instability)
         for triad, hypothesis in zip(TRIADS, parts, strict=True):
             for c in triad:
                 sizes[c] = hypothesis.sizes[c]

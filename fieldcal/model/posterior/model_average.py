@@ -6,14 +6,15 @@ an alias may be present instead. With the estimate of each set s and its weight 
     mean = sum_s w_s mean_s
     cov = sum_s w_s [cov_s + (mean_s - mean) (mean_s - mean)^T]                     (1)
 
-A parameter that a set does not have is 0 in it. An effect x that every device has to a
-small degree, and that is not in the set, is eliminated with it. With its prior
-covariance Q, and M and b' of `gram` after the elimination of the set,
+A parameter that a set does not have is 0 in it. Every device has some effects to a
+small degree. Such an effect x is eliminated with the sets that do not contain it. With
+its prior covariance Q, G_sx the elements of G between the columns of set and effect,
+and M and b' of `gram` after the elimination of the set,
 
     P = (Q^-1 + M)^-1
     mean_s - C_s G_sx P b'  and  C_s + C_s G_sx P G_xs C_s                          (2)
 
-stand for mean_s and C_s. Sources: J. Hoeting and others, Bayesian model averaging: a
+replace mean_s and C_s. Sources: J. Hoeting and others, Bayesian model averaging: a
 tutorial, 1999, (1) to (3); for (2), the inverse of a partitioned matrix.
 """
 
@@ -61,12 +62,12 @@ class ModelAverage:
     @cached_property
     def sets(self) -> list[tuple[Set, float]]:
         """Sets with enough weight, averaged over sizes, and their weights."""
-        every, out = self.posterior.weights_on_grid, list[tuple[Set, float]]()
-        least = np.exp(-MAX_LOG_DISTANCE) * max(w for _, w in every)
-        for fitted, weight in every:
+        visited, out = self.posterior.weights_on_grid, list[tuple[Set, float]]()
+        least = np.exp(-MAX_LOG_DISTANCE) * max(w for _, w in visited)
+        for fitted, weight in visited:
             if weight > least:
-                alike = self._with_mixed_sizes(fitted)
-                out += [(s, weight / len(alike)) for s in alike]
+                averaged = self._with_mixed_sizes(fitted)
+                out += [(s, weight / len(averaged)) for s in averaged]
         return out
 
     def _with_mixed_sizes(self, fitted: Set) -> Sequence[Set]:
@@ -78,9 +79,9 @@ class ModelAverage:
     def average_of_member(self, member: Member) -> tuple[Array, Array]:
         """Mean (k,) and covariance (k, k) of a member's parameters, if it is present.
 
-        If orientations are not known, the device may be described in rotated axes,
-        which makes k31 of k13: sets with other parameters of the cause are then
-        omitted.
+        If orientations are not known, a rotation of the device axes turns one
+        parameter into another, such as k13 into k31. Sets with other parameters of the
+        cause are then omitted.
         """
         cause, group = member
         containing = [(s, w) for s, w in self.sets if cause.key in s.keys]
@@ -132,7 +133,7 @@ def average_of_columns(
 
 def _places_of(columns: Index) -> Places:
     """Places of columns of the dictionary."""
-    return lambda one: [np.flatnonzero(one.state.columns == c) for c in columns]
+    return lambda fitted: [np.flatnonzero(fitted.state.columns == c) for c in columns]
 
 
 def average_over_sets(
@@ -148,8 +149,8 @@ def average_over_sets(
     for fitted, _ in sets:
         at = places(fitted)
         pick = np.zeros((len(at), len(fitted.state.columns)))
-        for row, some in zip(pick, at, strict=True):
-            row[some] = 1.0
+        for row, indices in zip(pick, at, strict=True):
+            row[indices] = 1.0
         mean, root = (estimate or set_estimate)(fitted)
         picked = pick @ root
         means.append(pick @ mean)

@@ -1,8 +1,8 @@
 """Probabilities of causes, and their aliases.
 
-The weight of a visited set is its evidence times its prior probability. Another cause
-is an alias of a cause if the best set with it instead has nearly the same evidence;
-prior probabilities do not count there. The probability of a cause is the weight of all
+The weight of a visited set is its evidence times its prior probability. Cause B is an
+alias of cause A if the best set with B instead of A has nearly the same evidence; prior
+probabilities are not used for this. The probability of a cause is the weight of all
 sets that contain it or an alias of its kind.
 """
 
@@ -37,7 +37,8 @@ class ProbableCause:
     members : of the best set with that name
     probability : that it, or an alias of its kind, is present
     aliases : names of its aliases, the likeliest first
-    alike : those of its kind: a function that no effect makes is no name of an effect
+    aliases_of_kind : the aliases that are effects like it, or functions without physics
+        like it
 
     """
 
@@ -45,7 +46,7 @@ class ProbableCause:
     members: tuple[Member, ...]
     probability: float
     aliases: tuple[str, ...]
-    alike: tuple[str, ...] = ()
+    aliases_of_kind: tuple[str, ...] = ()
 
     @property
     def triads(self) -> frozenset[str]:
@@ -75,9 +76,10 @@ class Posterior:
         self.search, self.sets, self.best = search, search.sets, best
         self._refined = refined
         self._nearer: list[tuple[Set, Set]] = []
-        every = dict.fromkeys(c.name for c, _ in best.members)
-        instead = {name: self._alternatives_to(name) for name in every}
-        self.alternatives = {name: instead[name] for name in self.cause_names(best)}
+        names = dict.fromkeys(c.name for c, _ in best.members)
+        # noise too: its alternatives are visited, and count in the weights
+        alternatives = {name: self._alternatives_to(name) for name in names}
+        self.alternatives = {n: alternatives[n] for n in self.cause_names(best)}
         for visited in list(self.sets.visited.values()) if best.members else ():
             if visited.score > best.score - MAX_LOG_DISTANCE:
                 visit_variations(self.sets, visited, best.score)
@@ -192,7 +194,7 @@ class Posterior:
 
     @cached_property
     def _variants_by_name(self) -> Counter[tuple[str, str]]:
-        """Number of variants of all causes that differ only in their position."""
+        """Number of variants by name and part, summed over positions."""
         counts = Counter[tuple[str, str]]()
         for cause in self.sets.dictionary.causes:
             counts[cause.name_and_part] += len(cause.variants)
@@ -232,8 +234,8 @@ class Posterior:
     def ranked_causes(self) -> list[tuple[str, float]]:
         """Every cause with its probability, the likeliest first."""
         causes = dict.fromkeys(n for s, _ in self.weights for n in self.cause_names(s))
-        each = [(name, self.probability([name])) for name in causes]
-        return sorted(each, key=lambda one: -one[1])
+        ranked = [(name, self.probability([name])) for name in causes]
+        return sorted(ranked, key=lambda cause: -cause[1])
 
     def probability(self, names: Iterable[str], triads: frozenset[str] = BOTH) -> float:
         """Probability that one of some causes is present on one of some triads."""
@@ -252,13 +254,13 @@ class Posterior:
         for name in self.cause_names(self.best):
             others = sorted(self.alternatives[name].items(), key=lambda i: -i[1].score)
             names = [n for n, _ in others]
-            strange = self._kind(name) == "unknown"
-            alike = [n for n in names if (self._kind(n) == "unknown") == strange]
+            unknown = self._kind(name) == "unknown"
+            of_kind = [n for n in names if (self._kind(n) == "unknown") == unknown]
             members = tuple(m for m in self.best.members if m[0].name == name)
-            one = ProbableCause(name, members, np.nan, tuple(names), tuple(alike))
-            probability = self.probability([name, *alike], one.triads)
+            cause = ProbableCause(name, members, np.nan, tuple(names), tuple(of_kind))
+            probability = self.probability([name, *of_kind], cause.triads)
             if probability >= thresholds.NAMED:
-                out.append(replace(one, probability=probability))
+                out.append(replace(cause, probability=probability))
         return out
 
 

@@ -1,9 +1,10 @@
 """The state of a set as it is reported: averaged over sizes.
 
-The most probable size may mislead. If the rows hardly determine a calibration
-parameter, its most probable size is the smallest, and that of an instability in few
-windows is often zero. So calibration parameters have the prior of devices of their
-kind, and the estimate is the mean over all instabilities (`mixture`).
+The most probable size may underestimate the uncertainty. If the rows hardly determine a
+calibration parameter, its most probable size is the smallest of the grid, and the most
+probable instability in few windows is often zero. Therefore calibration parameters have
+the prior of devices of their grade, and the estimate is the mean over all instabilities
+(`mixture`).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The uncertainty of time constants, in which the rows are not linear.
 
-A time constant tau_i has a sigma of its own. The parameters that fade with it, and the
-biases, depend on it. A set with n time constants is replaced by 2 n sets, each with one
-of them at another value,
+Each time constant tau_i, s, of a set has a standard uncertainty sigma_i. The amplitudes
+of the effects that decay with it, and the biases, depend on it nonlinearly. A set with
+n time constants is replaced by 2 n sets, each with one of them at another value,
 
     tau_i exp(+- sqrt(n) sigma_i / tau_i),    weight 1 / (2 n)                      (1)
 

@@ -77,7 +77,9 @@ def pair_gains(
     first = np.cumsum([0, *(len(g.columns) for g in groups)])
     wide = np.diff(first)
     alone = {
-        int(w): _Alone.of(inner, rhs, first[:-1][wide == w, None] + np.arange(w))
+        int(w): _SeparateGroups.of(
+            inner, rhs, first[:-1][wide == w, None] + np.arange(w)
+        )
         for w in np.unique(wide)
     }
     number = np.array([np.sum(wide[:i] == w) for i, w in enumerate(wide)])
@@ -95,12 +97,12 @@ def pair_gains(
             )
 
 
-def _gain_bound(one: _Alone, two: _Alone, shared: Array) -> Array:
+def _gain_bound(one: _SeparateGroups, two: _SeparateGroups, shared: Array) -> Array:
     """Upper bound of each pair's gain, (n,), by (3)."""
     if one.at.shape[1] > two.at.shape[1]:
         one, two, shared = two, one, np.swapaxes(shared, 1, 2)
     largest = np.full(len(shared), len(SIZES) - 1)
-    inner, rhs = _Beside(one, two, shared).rest(largest)
+    inner, rhs = _GroupsAfterOthers(one, two, shared).rest(largest)
     inner[:, range(inner.shape[1]), range(inner.shape[1])] += SIZES[-1] ** -2
     beside = np.linalg.solve(inner, rhs[:, :, None])[:, :, 0]
     own = (two.along**2 / (two.strength + SIZES[-1] ** -2)).sum(axis=1)
@@ -110,10 +112,17 @@ def _gain_bound(one: _Alone, two: _Alone, shared: Array) -> Array:
 
 
 def _gains_of_equal_widths(
-    one: _Alone, two: _Alone, shared: Array, start: Index, pairs: Sequence[list[int]]
+    one: _SeparateGroups,
+    two: _SeparateGroups,
+    shared: Array,
+    start: Index,
+    pairs: Sequence[list[int]],
 ) -> Iterator[PairGain]:
     """Gains of pairs whose first groups, and whose second groups, have equal widths."""
-    first, then = _Beside(one, two, shared), _Beside(two, one, shared.swapaxes(1, 2))
+    first, then = (
+        _GroupsAfterOthers(one, two, shared),
+        _GroupsAfterOthers(two, one, shared.swapaxes(1, 2)),
+    )
     n = np.arange(len(pairs))
     maxima = []
     for begin in (start, np.full(len(pairs), UNIT_INDEX)):
@@ -127,15 +136,15 @@ def _gains_of_equal_widths(
 
 
 @dataclass(frozen=True, slots=True)
-class _Alone:
-    """Groups of one width, each by itself, (n, ...).
+class _SeparateGroups:
+    """n groups of k columns each, as if each were added to the set without the others.
 
     Attributes
     ----------
-    at : their columns among those of all groups
-    inner, rhs : what the rows say of them
-    strength, axes, along : eigenvalues, eigenvectors, and the rhs along these
-    profile : gain and density over the sizes
+    at : (n, k) their columns among those of all groups
+    inner, rhs : (n, k, k), (n, k) M and b of each, after elimination of the set
+    strength, axes, along : lambda (n, k), U (n, k, k) and q (n, k)
+    profile : (n, sizes) gain plus log prior density at each size
 
     """
 
@@ -149,7 +158,7 @@ class _Alone:
 
     @classmethod
     def of(cls, inner: Array, rhs: Array, at: Index) -> Self:
-        """Groups of which all columns' `inner` and `rhs` are given."""
+        """Groups with columns `at` (n, k), of M and b of the columns of all groups."""
         own, right = inner[at[:, :, None], at[:, None, :]], rhs[at]
         strength, axes = np.linalg.eigh(own)
         top = np.diagonal(own, 0, 1, 2).max(axis=1, keepdims=True)
@@ -163,32 +172,37 @@ class _Alone:
         return cls(at, own, right, strength, axes, along, profile)
 
     def at_numbers(self, numbers: Index | NDArray[np.bool_]) -> Self:
-        """Some of the groups; one may be there more than once."""
+        """The groups of these numbers, which may repeat."""
         return type(self)(*(getattr(self, name)[numbers] for name in self.__slots__))
 
 
-class _Beside:
-    """Groups in addition to others of some sizes.
+class _GroupsAfterOthers:
+    """The first groups of n pairs, after elimination of the second groups.
 
     Parameters
     ----------
-    one, other : groups, and those that they are beside
-    shared : (n, k, l) what the rows say of both
+    one, other : first and second groups of the pairs
+    shared : (n, k, l) M_ij between their columns
 
     """
 
-    def __init__(self, one: _Alone, other: _Alone, shared: Array) -> None:
+    def __init__(
+        self, one: _SeparateGroups, other: _SeparateGroups, shared: Array
+    ) -> None:
         self.one, self.other = one, other
         self.shared = shared @ other.axes  # S^T
         self.wide = one.at.shape[1] > other.at.shape[1]
 
     def rest(self, size: Index) -> tuple[Array, Array]:
-        """Matrices of the groups after elimination of the others at some sizes, (1)."""
+        """Matrix and vector (1) of the first groups, with the second at sizes (n,).
+
+        `size` are indices in `priors.SIZES`.
+        """
         root, taken = self._taken(self.shared, size)
         return self.one.inner - root @ np.swapaxes(root, 1, 2), self.one.rhs - taken
 
     def profile(self, size: Index) -> Array:
-        """Gain and density over the sizes of the one, (n, sizes)."""
+        """Gain plus log density over the sizes of the first groups, (n, sizes)."""
         one = self.one
         if self.wide:
             root, taken = self._taken(np.swapaxes(one.axes, 1, 2) @ self.shared, size)
@@ -197,14 +211,14 @@ class _Beside:
         return evidence_gains(*self.rest(size), own) + LOG_DENSITY
 
     def _taken(self, shared: Array, size: Index) -> tuple[Array, Array]:
-        """S^T E^(1/2) and S^T E q of the others at some sizes."""
+        """S^T E^(1/2) and S^T E q of the second groups at some sizes."""
         other = self.other
         kept = 1 / (other.strength + 1 / SIZES[size, None] ** 2)
         taken = (shared @ (kept * other.along)[:, :, None])[:, :, 0]
         return shared * np.sqrt(kept)[:, None, :], taken
 
     def _in_axes(self, root: Array, rhs: Array) -> Array:
-        """The gain by (2), of W (n, k, l) and b' (n, k)."""
+        """Gain (n, sizes) by (2), of W (n, k, l) and b' (n, k)."""
         strength = self.one.strength
         wide = SIZES[:, None] ** 2
         back = wide / (1 + wide * strength[:, None, :])  # B, (n, sizes, k)

@@ -17,7 +17,7 @@ from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.system.end_columns import EndColumns
-from fieldcal.model.system.way_rows import seen_on_the_way
+from fieldcal.model.system.turn_force_rows import turn_force_columns
 from fieldcal.model.turns.turn import Turn, concatenate_rows
 
 
@@ -122,7 +122,7 @@ def columns_of_turns(
         ):
             builder.general_form(columns, table, bent)
             if known is not None:
-                kept = seen_on_the_way(columns, dictionary, known)
+                kept = turn_force_columns(columns, dictionary, known)
                 builder.general.append((columns[kept], table[:, :, kept]))
     return [builder.met() for builder in builders]
 

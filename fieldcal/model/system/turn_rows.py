@@ -2,7 +2,7 @@
 
 At the end of a turn the attitude R must take the attitude (or, without known angles,
 the force) of p to that of q. The remaining rotation is phi_T of `turn`, (1), the
-closure. During the turn the accelerometers measure (2) there (`way_rows`). White noise
+closure. The accelerometers measure (2) during the turn (`turn_force_rows`). White noise
 of the gyroscopes of density N gives phi_T the covariance N^2 T.
 
 Source: rotation kinematics to first order in phi.
@@ -27,7 +27,7 @@ from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
-from fieldcal.model.system.way_rows import WayRows, settling_amplitudes
+from fieldcal.model.system.turn_force_rows import TurnForceRows, settling_amplitudes
 from fieldcal.model.turns.attitude import closures, first_row_of_each, turn_geometry
 from fieldcal.model.turns.turn import Turn, TurnTracker, apply_way_effects, select_rows
 from fieldcal.physics.experience import Experience
@@ -184,7 +184,7 @@ class Turns:
         way: Array = np.zeros(0)
         design: Array = np.zeros((0, len(index)))
         if self.known is not None:
-            seen_by = WayRows(turn, view, d, self.known, self.rows.noise)
+            seen_by = TurnForceRows(turn, view, d, self.known, self.rows.noise)
             way, design = seen_by.rows(general, values, index)
         return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
 

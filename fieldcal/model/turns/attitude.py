@@ -1,7 +1,7 @@
-"""Kinematics of a turn: its attitudes, and what is known of them at both ends.
+"""Kinematics of a turn from position p to q: attitudes, forces and the closure.
 
-R (3, 3) takes vectors of the attitude at the start to that on the way (`rotation`);
-angles in rad, t in s.
+R (3, 3) transforms vectors from device axes at the start of the turn to device axes at
+a later instant (`rotation`). Angles in rad, forces in m/s^2, t in s.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
 
 ACCELERATION_MEAN_S = 0.1
-"""Means that the angular acceleration is taken from."""
+"""Length of the means of the rate whose derivative is the angular acceleration, s."""
 
 MAX_MISCLOSURE_RAD = 0.3
-"""Misclosure that no gyroscope error makes, rad: outputs clipped, or another turn."""
+"""Largest closure that gyroscope errors can make, rad. A larger one means that outputs
+were clipped, or that the device was turned otherwise than its positions say."""
 
 
 def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
-    """Means between cuts (indices) of a course given at instants."""
+    """Means (k, ...) between indices cut (k + 1,) of values (n, ...) at instants t."""
     gaps = np.diff(t).reshape(-1, *[1] * (values.ndim - 1))
     total = np.zeros_like(values, dtype=float)
     total[1:] = np.cumsum((values[1:] + values[:-1]) / 2 * gaps, axis=0)
@@ -38,21 +39,29 @@ def interpolate_vectors(
 ) -> Array:
     """Vectors fixed in the base, in device axes during a turn, (m + 1, 3, ...).
 
-    `start` and `end` (3, ...) are their values at both ends; `attitude` (m + 1, 3, 3)
-    is R and `done` (m + 1,) the completed part of the turn.
+    They are carried along from both ends, and weighted by the completed part. `start`
+    and `end` (3, ...) are their values in device axes at both ends, `attitude` (m + 1,
+    3, 3) is R, and `done` (m + 1,) the completed part of the turn.
     """
     part = done.reshape(-1, *[1] * start.ndim)
-    back = attitude @ attitude[-1].T
-    out: Array = (1 - part) * (attitude @ start) + part * (back @ end)
+    from_end = attitude @ attitude[-1].T
+    out: Array = (1 - part) * (attitude @ start) + part * (from_end @ end)
     return out
 
 
 def sampling_error(t: Array, w: Array, each: int, noise: Array) -> float:
-    """Error of the attitude by the finite sampling rate, rad.
+    """Error of the attitude at the end of a turn by the finite sampling rate, rad.
 
-    The attitude is compared with that from every other sample. Their difference, less
-    the part of the noise (3,) rad/s, is divided by three (Richardson's rule for a
-    method of second order at least).
+    The attitude from all samples is compared with that from every second one. The part
+    of noise is subtracted from the square of their difference, and the root is divided
+    by three (Richardson's rule for a method of second order at least).
+
+    Parameters
+    ----------
+    t, w : (n,) s, (n, 3) rad/s samples of the turn
+    each : samples in a step of the integration
+    noise : (3,) white noise of one sample, rad/s
+
     """
     whole = (len(t) - 1) // (2 * each) * 2 * each
     ends = []
@@ -62,10 +71,10 @@ def sampling_error(t: Array, w: Array, each: int, noise: Array) -> float:
         ends.append(
             attitudes_from_rotations(small_turns(t[coarse], w[coarse], edge))[-1]
         )
-    off = ends[0] @ ends[1].T
-    apart = off[2, 1] ** 2 + off[0, 2] ** 2 + off[1, 0] ** 2
-    chance = float(noise @ noise) * float(t[-1] - t[0]) ** 2 / len(t)
-    return float(np.sqrt(max(apart - chance, 0.0)) / 3)
+    rotation = ends[0] @ ends[1].T
+    square = rotation[2, 1] ** 2 + rotation[0, 2] ** 2 + rotation[1, 0] ** 2
+    by_noise = float(noise @ noise) * float(t[-1] - t[0]) ** 2 / len(t)
+    return float(np.sqrt(max(square - by_noise, 0.0)) / 3)
 
 
 def antisymmetric_vector(matrix: Array) -> Array:
@@ -80,22 +89,26 @@ def antisymmetric_vector(matrix: Array) -> Array:
 
 
 def accelerations(t: Array, w: Array) -> Array:
-    """Angular acceleration at the edges (m + 1, 3), from short means of the rate."""
+    """Angular acceleration (m + 1, 3), rad/s^2, from short means of the rates w."""
     step = float(np.ptp(t)) / (len(t) - 1)
     m = max(1, round(ACCELERATION_MEAN_S / step)) | 1
     kernel = np.ones(m) / m
     padded = np.pad(w, ((m // 2, m // 2), (0, 0)), mode="edge")
     smooth = np.column_stack([np.convolve(c, kernel, "valid") for c in padded.T])
-    # times are averaged likewise: those of one batch may be the same but for a little
+    # times are averaged too: samples that arrive in one batch have nearly equal times
     times = np.pad(t, m // 2, mode="reflect", reflect_type="odd")
     return derivative(np.convolve(times, kernel, "valid"), smooth)
 
 
-def vertical_lost(x: Experience, pair: tuple[int, int], attitude: Array) -> bool:
-    """Whether the gyroscopes lost track of the vertical in a turn."""
+def contradicts_force(x: Experience, pair: tuple[int, int], attitude: Array) -> bool:
+    """Whether the attitude R at the end of a turn contradicts the forces f_p and f_q.
+
+    It does if the force at q, carried back to p, is more than `MAX_MISCLOSURE_RAD` from
+    the force at p.
+    """
     p, q = (x.f[int(np.argmax(x.position == i))] for i in pair)
-    along = float(p @ (attitude.T @ q)) / float(np.linalg.norm(p) * np.linalg.norm(q))
-    return bool(along < np.cos(MAX_MISCLOSURE_RAD))
+    cosine = float(p @ (attitude.T @ q)) / float(np.linalg.norm(p) * np.linalg.norm(q))
+    return bool(cosine < np.cos(MAX_MISCLOSURE_RAD))
 
 
 def turn_geometry(
@@ -103,11 +116,18 @@ def turn_geometry(
 ) -> tuple[Array, Array, Array]:
     """Force during a turn and its closure, by the positions at both ends.
 
+    Parameters
+    ----------
+    x : inputs in the rows of the windows
+    pair : p and q
+    attitude, done : (m + 1, 3, 3) R and (m + 1,) u at the edges
+
     Returns
     -------
     f : (m + 1, 3) force during the turn, interpolated from both ends
-    closure : (3,) phi_T in the axes of p
-    known : (3, 3) projection on the known part of the closure
+    closure : (3,) phi_T, rad, in device axes at p
+    known : (3, 3) projection on the known part of the closure: all of it, or the part
+        across the force at p if an orientation is unknown
 
     """
     ends = first_row_of_each(x, pair)
@@ -120,31 +140,32 @@ def turn_geometry(
 
 
 def first_row_of_each(x: Experience, positions: Iterable[int]) -> Index:
-    """The first row of each position."""
+    """Index of the first row of each position, (p,)."""
     return np.array([int(np.argmax(x.position == p)) for p in positions])
 
 
 def closures(f: Array, held: Array, end: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Closures phi_T in the axes of p, and whether all components are known.
+    """Closures phi_T in device axes at p, and whether all components are known.
 
     Parameters
     ----------
     f : (n, 2, 3) forces in both positions, device axes
     held : (n, 2, 3, 3) direction cosines from base to device; nan where unknown
-    end : (3, 3) attitude at the end of the turn
+    end : (3, 3) attitude R at the end of the turn
 
     Returns
     -------
-    (n, 3) rad, and (n,); if not all is known, the part perpendicular to the force at p
+    (n, 3) rad, and (n,) whether it is whole; if not, it is the part across the force at
+    p, from the directions of both forces
 
     """
-    off = end.T @ held[:, 1] @ np.swapaxes(held[:, 0], 1, 2)  # I + [phi]x
-    whole = (np.trace(off, axis1=1, axis2=2) - 1) / 2 > np.cos(MAX_MISCLOSURE_RAD)
+    rotation = end.T @ held[:, 1] @ np.swapaxes(held[:, 0], 1, 2)  # I + [phi]x
+    whole = (np.trace(rotation, axis1=1, axis2=2) - 1) / 2 > np.cos(MAX_MISCLOSURE_RAD)
     if whole.all():
-        return antisymmetric_vector(off), whole
+        return antisymmetric_vector(rotation), whole
     up = f[:, 0] / np.linalg.norm(f[:, 0], axis=1, keepdims=True)
     force = f[:, 1] @ end
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     return np.where(
-        whole[:, None], antisymmetric_vector(off), np.cross(up, force)
+        whole[:, None], antisymmetric_vector(rotation), np.cross(up, force)
     ), whole

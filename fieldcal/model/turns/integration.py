@@ -1,11 +1,13 @@
-"""The course of a turn: the attitude on the way, integrated from the gyroscopes.
+"""The attitude during a turn, integrated from the gyroscopes.
 
-With bias d and scale s of the model, w^ = (W - d)/s - w_earth and steps of dt,
+With the bias d and scale factor s of the model, w^ = (W - d)/s - w_earth, and steps of
+dt,
 
     R_k = exp(-[w^ dt]x) R_{k-1},   u_k = sum_{j<=k} |w^ dt| / sum_j |w^ dt|
 
-R transforms vectors from device axes at the start of the turn to device axes at step k;
-u is the part of the turn that is completed. rad/s. Source: rotation kinematics.
+R_k transforms vectors from device axes at the start of the turn to device axes at step
+k; u_k is the part of the turn that is completed, 0 to 1. Rates in rad/s. Source:
+rotation kinematics.
 """
 
 from __future__ import annotations
@@ -22,16 +24,16 @@ from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
 
 INTEGRATION_STEP_S = 0.02
-"""Step of the integration at high sampling rates."""
+"""Step of the integration, s; one sample where samples come less often."""
 
 WAY_MEAN_S = 0.15
-"""Means of the accelerometers on the way."""
+"""Length of the means of the accelerometers during a turn, s."""
 
 MAX_WAY_MEANS = 60
-"""Of one turn at most."""
+"""Largest number of such means in one turn."""
 
 MIN_STEPS = 8
-"""Steps that a turn takes at least."""
+"""Smallest number of steps of a turn that is integrated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +43,11 @@ class Leg:
     Attributes
     ----------
     source : samples
-    x : inputs in the windows
+    x : inputs of the device in the rows of the windows
     bias, scale : (3,) of the gyroscopes
-    late : s by which they are late
+    delay : s by which the outputs of the gyroscopes are late
     pair : windows that the turn leads from and to
-    first, last : bounds of the motion, in samples
+    first, last : the motion is in samples [first, last)
 
     """
 
@@ -53,7 +55,7 @@ class Leg:
     x: Experience
     bias: Array
     scale: Array
-    late: float
+    delay: float
     pair: tuple[int, int]
     first: int
     last: int
@@ -65,11 +67,11 @@ class Steps:
 
     Attributes
     ----------
-    first : sample that it begins with
-    t : (n,) s
+    first : index in the recording of the first sample of the turn
+    t : (n,) s, instants of the samples of the turn
     each : samples in a step
-    edge : (m + 1,) samples at the edges of the steps
-    cut : (k + 1,) edges between the pieces
+    edge : (m + 1,) indices in `t` of the edges of the steps
+    cut : (k + 1,) indices in `edge` of the bounds of the pieces
 
     """
 
@@ -92,7 +94,7 @@ class IntegratedTurn:
 
     Attributes
     ----------
-    rate, earth : (n, 3) rad/s at the samples, and the Earth's part of it
+    rate, earth : (n, 3) rad/s at the samples: angular rate, and Earth's rate in it
     attitude : (m + 1, 3, 3) R at the edges
     done : (m + 1,) u at the edges
 
@@ -105,7 +107,10 @@ class IntegratedTurn:
 
 
 def divide_into_steps(leg: Leg) -> Steps | None:
-    """Steps of about 0.02 s and pieces of about 0.15 s; None if there are too few."""
+    """Steps of about 0.02 s and pieces of about 0.15 s.
+
+    None if there are fewer than `MIN_STEPS` steps.
+    """
     block, first = leg.source.block, leg.first
     rate = leg.source.rate
     each = max(1, round(INTEGRATION_STEP_S * rate))
@@ -118,14 +123,18 @@ def divide_into_steps(leg: Leg) -> Steps | None:
     return Steps(first, t, each, np.arange(count + 1) * each, cut)
 
 
-def integrate_turn(leg: Leg, steps: Steps, rid: Array) -> IntegratedTurn:
-    """Integrate a turn; `rid` (m + 1, 3) are known errors of the rates, rad/s."""
+def integrate_turn(leg: Leg, steps: Steps, known_errors: Array) -> IntegratedTurn:
+    """Integrate a turn.
+
+    `known_errors` (m + 1, 3), rad/s at the edges, are subtracted from the outputs.
+    """
     x, t, edge = leg.x, steps.t, steps.edge
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
     ends = [x.w[x.position == p].mean(axis=0) for p in leg.pair]
     earth = (1 - part) * ends[0] + part * ends[1]
-    rate = _angular_rates(leg, t, _interpolated(t, steps.at, rid))
-    for _ in range(2):  # the second time with the Earth's rate in the moving axes
+    rate = _angular_rates(leg, t, _interpolated(t, steps.at, known_errors))
+    # first with the Earth's rate interpolated in time, then carried by the attitude
+    for _ in range(2):
         angle = small_turns(t, rate - earth, edge) / leg.source.pace
         size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
         attitude, done = attitudes_from_rotations(angle), size / size[-1]
@@ -134,16 +143,19 @@ def integrate_turn(leg: Leg, steps: Steps, rid: Array) -> IntegratedTurn:
 
 
 def _interpolated(t: Array, at: Array, values: Array) -> Array:
-    """Columns of values given at some instants, straight between them, (n, k)."""
+    """Values (n, k) at instants t (n,), linear between those at instants `at`."""
     return np.column_stack([np.interp(t, at, column) for column in values.T])
 
 
-def _angular_rates(leg: Leg, t: Array, rid: Array) -> Array:
-    """Angular rate at some samples, (n, 3) rad/s."""
+def _angular_rates(leg: Leg, t: Array, known_errors: Array) -> Array:
+    """Angular rate at instants t (n,), (n, 3) rad/s, corrected for the delay.
+
+    `known_errors` (n, 3) rad/s are subtracted from the outputs.
+    """
     block = leg.source.block
     first, n = int(np.searchsorted(block.t, t[0])), len(t)
     span = slice(max(first - n, 0), first + 2 * n)
-    late = t + leg.late
-    measured = [np.interp(late, block.t[span], g) for g in block.gyr[span].T]
-    rate: Array = (np.stack(measured, axis=1) - leg.bias - rid) / leg.scale
+    delayed = t + leg.delay
+    measured = [np.interp(delayed, block.t[span], g) for g in block.gyr[span].T]
+    rate: Array = (np.stack(measured, axis=1) - leg.bias - known_errors) / leg.scale
     return rate

@@ -9,16 +9,17 @@ from fieldcal.core.sampling import has_no_pause
 from fieldcal.model.rows.reduce import Rows, RowSource
 
 MARGIN_S = 0.6
-"""Time before and after the motion that is integrated too, s."""
+"""Time before and after the motion that belongs to the integrated turn, s."""
 
 MAX_TURN_S = 60.0
-"""A turn that takes longer is not followed."""
+"""Longest turn that is integrated, s."""
 
 MIN_MOTION_RATIO = 2.0
-"""Least ratio of motion to limit; below, the whole gap is used."""
+"""Least ratio of the largest rate to the limit of motion. Below it the motion cannot be
+located, and the whole gap between the windows is integrated."""
 
 BELONGING_S = 5.0
-"""Time before and after a motion in which smaller ones belong to it, s."""
+"""Time before and after a motion in which smaller motions are looked for, s."""
 
 MOVING_SIGMAS = 5.0
 """Standard deviations of the integrated angle from which the device moves."""
@@ -33,8 +34,9 @@ def motion_bounds(
 
     Parameters
     ----------
-    pair : the windows
-    first, last : bounds of the gap between them, in samples
+    source, rows : samples, and the rows of the windows
+    pair : positions of the windows
+    first, last : samples [first, last) are the gap between the windows
 
     """
     block, rate = source.block, source.rate
@@ -46,17 +48,17 @@ def motion_bounds(
     whole = (first, last) if block.t[last - 1] - block.t[first] < MAX_TURN_S else None
     rates = [rows.y[rows.x.position == p, 3:] for p in pair]
     if not all(np.isfinite(window_rates).any(axis=0).all() for window_rates in rates):
-        return whole  # nothing tells how they rest
+        return whole  # the rates at rest are not known
     rest = [np.nanmean(window_rates, axis=0) for window_rates in rates]
     total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])
-    level = np.abs(total[m:] - total[:-m]) / m
+    mean_rate = np.abs(total[m:] - total[:-m]) / m
     limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
-    at = np.flatnonzero((level > limit).any(axis=1))
-    if not (len(at) and level.max() > MIN_MOTION_RATIO * limit.min()):
+    at = np.flatnonzero((mean_rate > limit).any(axis=1))
+    if not (len(at) and mean_rate.max() > MIN_MOTION_RATIO * limit.min()):
         return whole
-    noise, each = rows.noise[3:], round(BELONGING_S * rate)
-    before = block.gyr[gap][max(at[0] - each, 0) : at[0]] - rest[0]
-    after = block.gyr[gap][at[-1] + m : at[-1] + m + each] - rest[1]
+    noise, nearby = rows.noise[3:], round(BELONGING_S * rate)
+    before = block.gyr[gap][max(at[0] - nearby, 0) : at[0]] - rest[0]
+    after = block.gyr[gap][at[-1] + m : at[-1] + m + nearby] - rest[1]
     margin = round(MARGIN_S * rate)
     start = first + int(at[0]) - _moving_at_end(before, noise) - margin
     end = first + int(at[-1]) + m + _moving_at_end(after[::-1], noise) + margin
@@ -64,12 +66,13 @@ def motion_bounds(
     return (start, end) if block.t[end - 1] - block.t[start] < MAX_TURN_S else None
 
 
-def _moving_at_end(off: Array, noise: Array) -> int:
+def _moving_at_end(rates: Array, noise: Array) -> int:
     """Number of samples from where the integrated angle exceeds its noise to the end.
 
-    The integral shows rotation that is too slow to be seen in single samples.
+    The integral shows rotation that is too slow to be seen in single samples. `rates`
+    (n, 3) are samples less the rate at rest; `noise` (3,) is that of one sample.
     """
-    angle = np.abs(np.cumsum(off, axis=0))
-    spread = noise * np.sqrt(np.arange(1, len(off) + 1))[:, None]
+    angle = np.abs(np.cumsum(rates, axis=0))
+    spread = noise * np.sqrt(np.arange(1, len(rates) + 1))[:, None]
     moved = (angle > MOVING_SIGMAS * spread).any(axis=1)
-    return len(off) - int(np.argmax(moved)) if moved.any() else 0
+    return len(rates) - int(np.argmax(moved)) if moved.any() else 0

@@ -1,17 +1,18 @@
-"""Rotations from rates: integration on SO(3), and its derivative by the rates.
+"""Rotations from angular rates: integration on SO(3).
 
 A vector u that is fixed in space obeys, in the axes of a body that turns at w,
 
     du/dt = -w x u,   u(t) = F(t) u(0),   F = ... E_2 E_1,   E_j = exp(-[q_j x])   (1)
 
-in steps of T seconds from edge a to edge b, which contain samples every h seconds:
+The step from edge a to edge b takes T seconds and contains samples every h seconds:
 
     m_k = (w_k + w_k+1) / 2 - h_k (w'_k+1 - w'_k) / 12                            (2)
     q_j = sum_k h_k m_k + T^2 (w_a x w_b) / 12                                    (3)
 
-(2) is the mean rate between two samples. With w' from differences over two steps it is
-(13 (w_k + w_k+1) - w_k-1 - w_k+2) / 24 for even steps, of fourth order. The last term
-of (3) is the rotation that remains after a cycle of coning. w rad/s, device axes.
+m_k of (2) is the mean rate between samples k and k + 1. If w' is a difference over two
+samples, m_k is (13 (w_k + w_k+1) - w_k-1 - w_k+2) / 24 for evenly spaced samples, which
+is of fourth order. q_j is the rotation vector of step j, rad; its last term is the
+rotation that remains after a cycle of coning. w in rad/s, device axes.
 Source: rule of Euler and Maclaurin (2); Magnus 1954, for rates that change evenly
 within a step (3); P. G. Savage 1998, for coning.
 """
@@ -27,7 +28,10 @@ from fieldcal.core.samples import Array
 
 
 def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
-    """Small turns q (m, 3), rad, between edges (m + 1,), samples of a turn, (3)."""
+    """Rotation vectors q (m, 3), rad, of the steps between the edges, (3).
+
+    `t` (n,) s and `w` (n, 3) rad/s are samples; `edge` (m + 1,) indices of them.
+    """
     total = np.add.reduceat(
         (np.diff(t)[:, None] * mean_rates(t, w))[: edge[-1]], edge[:-1], axis=0
     )
@@ -46,9 +50,10 @@ def mean_rates(t: Array, w: Array) -> Array:
 
 
 def attitudes_from_rotations(angle: Array) -> Array:
-    """Attitudes from small turns, (m + 1, 3, 3), the first of them identity, (1).
+    """Attitudes F at the edges, (m + 1, 3, 3), the first of them the identity, (1).
 
-    `angle` is (m, 3) rad; the turn of a body by it turns vectors seen in it back.
+    `angle` (m, 3) rad are the rotation vectors of the body in each step. A vector that
+    is fixed in space rotates by -`angle` in body axes.
 
     >>> quarter = attitudes_from_rotations(np.full((90, 3), [0.0, 0.0, np.pi / 180]))
     >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0

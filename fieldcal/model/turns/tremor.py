@@ -1,13 +1,14 @@
 """Sway of the device at the ends of a turn.
 
-The mean force of a window tells its mean attitude, and a turn is followed from one
-instant to another. Where a base or a hand sways by psi(t) about the mean attitude, the
-closure has what it sways by at both instants in it:
+The mean force of a window gives its mean attitude, but a turn is integrated from one
+instant to another. If a base or a hand sways by the angle psi(t), rad, about the mean
+attitude, the closure contains psi at both instants:
 
     var(phi_T) = <psi_p^2> + <psi_q^2>                                            (1)
 
-psi is what the gyroscopes sum up to in the window, less a constant and a drift. White
-noise of density N sums up to a walk, of which these leave, over T on average,
+psi is the integral of the gyroscopes over T seconds of the window, less a straight line
+in time. The integral of white noise of density N, rad/s/sqrt(Hz), is a random walk.
+After the line is subtracted, its mean square is on average
 
     <psi^2> = N^2 T / 15                                                          (2)
 
@@ -22,10 +23,10 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.reduce import RowSource
 
 WINDOW_EDGE_S = 10.0
-"""Time of a window next to the turn that is looked at, s."""
+"""Part of a window next to the turn in which sway is measured, s."""
 
 MIN_SAMPLES = 16
-"""Least number of samples."""
+"""Number of samples below which no sway is measured."""
 
 
 def sway_at_ends(source: RowSource, windows: Index) -> float:
@@ -34,7 +35,7 @@ def sway_at_ends(source: RowSource, windows: Index) -> float:
     Parameters
     ----------
     source : samples
-    windows : (2, 2) bounds of those before and after the turn, in samples
+    windows : (2, 2) first and end sample of the windows before and after the turn
 
     """
     most = round(WINDOW_EDGE_S * source.rate)
@@ -43,9 +44,9 @@ def sway_at_ends(source: RowSource, windows: Index) -> float:
     after = slice(start, min(last, start + most))
     scale = source.about.nominal["gyr_scale"]
     return sum(
-        sway_variance(source.block.gyr[some] / scale, 1 / source.rate)
-        for some in (before, after)
-        if source.usable[some, 3:].all()
+        sway_variance(source.block.gyr[samples] / scale, 1 / source.rate)
+        for samples in (before, after)
+        if source.usable[samples, 3:].all()
     )
 
 
@@ -62,8 +63,8 @@ def sway_variance(rate: Array, step: float) -> float:
     if n < MIN_SAMPLES:
         return 0.0
     angle = np.cumsum((rate - rate.mean(axis=0)) * step, axis=0)
-    flat = np.linalg.qr(np.column_stack([np.ones(n), np.arange(n)]))[0]
-    psi = angle - flat @ (flat.T @ angle)
+    line = np.linalg.qr(np.column_stack([np.ones(n), np.arange(n)]))[0]
+    psi = angle - line @ (line.T @ angle)
     white = (np.diff(rate, n=2, axis=0) ** 2).mean(axis=0) / 6
-    walked = white * step**2 * n / 15  # (2)
-    return float(np.maximum((psi**2).mean(axis=0) - walked, 0.0).max())
+    by_noise = white * step**2 * n / 15  # (2)
+    return float(np.maximum((psi**2).mean(axis=0) - by_noise, 0.0).max())

@@ -47,7 +47,7 @@ def test_levels_are_those_of_the_rows_written_out(
             inner, rhs, alone = left(dense, block)
             np.testing.assert_allclose(found.inner[n, w], inner, rtol=1e-8, atol=1e-9)
             np.testing.assert_allclose(found.rhs[n, w], rhs, rtol=1e-8, atol=1e-9)
-            np.testing.assert_allclose(found.alone[n, w], alone, rtol=1e-8)
+            np.testing.assert_allclose(found.diagonal[n, w], alone, rtol=1e-8)
 
 
 def test_a_set_that_may_be_given_nothing_has_its_score_all_the_same() -> None:

@@ -50,7 +50,7 @@ def test_what_cannot_be_seen_beside_the_noise_is_one_instability(
     least = int(np.argmax(SIZES * typical >= 0.2 * noise))
     assert one._smallest_visible_index(triad) == least
     sizes, chance = one._shifted(triad)
-    mode = one.there.sizes.instability
+    mode = one.fitted.sizes.instability
     assert all(s[c] == mode[c] for s in sizes for c in range(7) if c not in triad)
     middle = round(float(np.mean([mode[c] for c in triad])))
     steps = range(-middle, len(SIZES) - middle)

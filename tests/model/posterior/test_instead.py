@@ -92,7 +92,7 @@ def test_a_function_that_no_effect_makes_is_no_other_name_for_an_effect() -> Non
     (walk,) = (c for c in session.dictionary.causes if c.name == "random_walk")
     posterior = Posterior(search, search.sets.evaluate(((walk, walk.variants[0]),)))
     (found,) = posterior.probable_causes()
-    assert (found.aliases, found.alike) == (("time",), ())
+    assert (found.aliases, found.aliases_of_kind) == (("time",), ())
     own, both = (
         posterior.probability(n) for n in (["random_walk"], ["random_walk", "time"])
     )

@@ -14,7 +14,7 @@ from fieldcal.model.causes import columns
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.state import Term
-from fieldcal.model.system import turn_rows, way_rows
+from fieldcal.model.system import turn_force_rows, turn_rows
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.model.system.window_rows import WindowSystem
@@ -118,9 +118,11 @@ SETTLING = Term(EFFECTS["settling"], np.linspace(-2e-3, 3e-3, 6), {"tau_s": 5.0}
 
 def test_what_begins_to_fade_at_the_end_of_a_turn_is_its_size() -> None:
     state = replace(nominal(), bias=np.full(6, 0.3), terms=(SETTLING,))
-    found = way_rows.settling_amplitudes(state, X, X.since_turn[None])
+    found = turn_force_rows.settling_amplitudes(state, X, X.since_turn[None])
     np.testing.assert_allclose(found, SETTLING.values, atol=1e-15)
-    assert not way_rows.settling_amplitudes(nominal(), X, X.since_turn[None]).any()
+    assert not turn_force_rows.settling_amplitudes(
+        nominal(), X, X.since_turn[None]
+    ).any()
 
 
 def test_what_settles_builds_up_smoothly_and_is_known_better_afterwards() -> None:
@@ -128,11 +130,11 @@ def test_what_settles_builds_up_smoothly_and_is_known_better_afterwards() -> Non
     x = replace(X, t=t)
     since = np.where(t >= 105.0, t - 105.0, np.inf)[None]
     middle = np.array([0.5, 4.9, 5.29, 5.31, 7.0])
-    found = way_rows._settling_covariance(x, since, middle)
+    found = turn_force_rows._settling_covariance(x, since, middle)
     size = np.array([0.5, 0.5, 0.5, 0.15, 0.15])
     apart = (middle[:, None] - middle) / 2.0
     np.testing.assert_allclose(found, np.outer(size, size) * np.exp(-(apart**2) / 2))
-    never = way_rows._settling_covariance(
+    never = turn_force_rows._settling_covariance(
         x, np.full((1, 33), np.inf), np.array([1.0, 8.2, 8.4])
     )
     np.testing.assert_allclose(np.diag(never), [0.25, 0.25, 0.0225])

@@ -17,11 +17,11 @@ from fieldcal.model.turns.attitude import (
     MAX_MISCLOSURE_RAD,
     accelerations,
     antisymmetric_vector,
+    contradicts_force,
     interpolate_vectors,
     sampling_error,
     trapezoid_means,
     turn_geometry,
-    vertical_lost,
 )
 from fieldcal.model.turns.integration import Leg, divide_into_steps, integrate_turn
 from fieldcal.model.turns.rotation import mean_rates, products
@@ -78,9 +78,9 @@ def test_an_attitude_that_is_far_off_is_lost(off: float, lost: bool) -> None:
     across = np.cross(f, [0.3, -0.8, 0.5])
     across /= np.linalg.norm(across)
     assert MAX_MISCLOSURE_RAD == 0.3
-    assert vertical_lost(x, (0, 1), way() @ rotation_matrices(off * across)) == lost
+    assert contradicts_force(x, (0, 1), way() @ rotation_matrices(off * across)) == lost
     about = way() @ rotation_matrices(off * f)
-    assert not vertical_lost(x, (0, 1), about)
+    assert not contradicts_force(x, (0, 1), about)
     _, closure, known = turn_geometry(
         x, (0, 1), np.array([np.eye(3), about]), np.array([0, 1])
     )
@@ -196,7 +196,7 @@ def leg(rate_hz: float, seconds: float, w: Array, **more: Array | float) -> Leg:
     )  # fmt: skip
     first = round(2.0 * rate_hz)
     x = replace(ends(), w=np.zeros((5, 3)))
-    known = {"bias": np.zeros(3), "scale": np.ones(3), "late": 0.0} | more
+    known = {"bias": np.zeros(3), "scale": np.ones(3), "delay": 0.0} | more
     last = first + round(seconds * rate_hz)
     return Leg(source, x, pair=(0, 1), first=first, last=last, **known)  # type: ignore[arg-type]
 
@@ -266,7 +266,7 @@ def test_rates_that_are_late_are_taken_later() -> None:
     ramp = replace(one.source, block=replace(one.source.block, gyr=gyr))
     steps = divide_into_steps(one)
     assert steps is not None
-    late = replace(one, source=ramp, late=0.03)
+    late = replace(one, source=ramp, delay=0.03)
     found = integrate_turn(late, steps, np.zeros((len(steps.edge), 3)))
     expected = np.outer(steps.t + 0.03, [1.0, -1.0, 2.0])
     np.testing.assert_allclose(found.rate, expected, atol=1e-12)

@@ -21,8 +21,8 @@ from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import Term
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.turn_force_rows import TurnForceRows
 from fieldcal.model.system.turn_rows import TurnRows
-from fieldcal.model.system.way_rows import WayRows
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.session.description import parse_description
 from fieldcal.sim_device.effect import SimulatedEffect
@@ -259,7 +259,7 @@ def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
 
 
 def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
-    """(1) of `way_rows`, against walks that are drawn and carried along the turn."""
+    """(1) of `turn_force_rows`, against walks drawn and carried along the turn."""
     one = ride("gyro_scale")
     fit, state = one.fit, one.fit.nominal
     assert fit.turns is not None
@@ -267,7 +267,7 @@ def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
     turn = next(iter(turning.turns(state)))
     since = turning.time_since_turn(turn.x.t, turn.positions[1])
     view, noise = RowView(turn.x, turn.x, since, state), np.repeat([0.0, 1e-2], 3)
-    found = WayRows(turn, view, fit.dictionary, one.known, noise)._covariance()
+    found = TurnForceRows(turn, view, fit.dictionary, one.known, noise)._covariance()
     rng, gaps = np.random.default_rng(1), np.diff(turn.x.t)
     density = noise[3] * np.sqrt(turn.interval)
     steps = density * rng.standard_normal((1500, len(gaps), 3)) * gaps[:, None] ** 0.5

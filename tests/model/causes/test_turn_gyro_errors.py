@@ -19,7 +19,7 @@ from fieldcal.diagnosis.wording.paragraph import notes
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.causes.columns import General, RowView
-from fieldcal.model.causes.lost_way import lost_ways
+from fieldcal.model.causes.turn_gyro_errors import turn_gyro_errors
 from fieldcal.model.turns.turn import select_rows
 from fieldcal.session.description import parse_description
 from fieldcal.session.folder import Session
@@ -107,7 +107,7 @@ def test_scale_factors_are_those_of_the_turns_that_were_followed(
 def test_the_columns_are_rates_on_one_way_each() -> None:
     x = ladder(rows=3)
     table = dictionary(x)
-    causes = list(lost_ways(table))
+    causes = list(turn_gyro_errors(table))
     assert len(causes) == len(table.window_positions) - 1
     _, basis = table.bases[-1]
     assert isinstance(basis, General)

@@ -1,13 +1,14 @@
-"""A way that was not followed: what one turn was off by, and no other.
+"""Errors of the gyroscopes in a single turn, which leave its closure free.
 
-Samples are lost while time is counted by them, an output runs against its range, the
-device is knocked: the gyroscopes then miss a part of one turn, whatever they are. Seen
-from the closure, they were off by a rate w_k on that way alone,
+The gyroscopes miss a part of one turn if samples are lost while time is counted by
+samples, if an output reaches the end of its range, or if the device is knocked. In the
+closure this is an error of the rate, w_k in rad/s, during that turn alone,
 
     U_gyr += w_k    between windows k and k + 1                                     (1)
 
-so that all three axes of the closure are free. Without it, the closures of all turns
-would scatter as much, or the axes of that turn would have another scale factor.
+so that all three axes of its closure are free. Without this cause, the closures of all
+turns would have a larger scatter, or the gyroscopes a wrong scale factor on the axes of
+that turn.
 """
 
 from __future__ import annotations
@@ -23,23 +24,24 @@ from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General, RowView
 
 MIN_TURNS = 3
-"""Ways of which one may be told from the others."""
+"""Number of turns from which an error of one of them can be recognised."""
 
 
-def lost_ways(table: ColumnTable) -> Iterator[Cause]:
-    """One cause for each way between two windows, of three columns."""
+def turn_gyro_errors(table: ColumnTable) -> Iterator[Cause]:
+    """One cause for each turn between two windows, with three columns of rad/s."""
     x, held = table.x, table.window_positions
     middle = np.array([x.t[x.position == p].mean() for p in held])
     first = np.array([(x.t + x.lasts / 2)[x.position == p].max() for p in held[:-1]])
     last = np.array([(x.t - x.lasts / 2)[x.position == p].min() for p in held[1:]])
-    long = last - first
-    known = np.flatnonzero(long > 0)
-    if len(known) < MIN_TURNS:
+    seconds = last - first
+    turns = np.flatnonzero(seconds > 0)
+    if len(turns) < MIN_TURNS:
         return
 
     def columns(view: RowView) -> Array:
-        out = np.zeros((len(view.x), 6, 3 * len(known)))
-        for i, k in enumerate(known):
+        """Columns (n, 6, 3 turns): 1 for each gyroscope in the rows of each turn."""
+        out = np.zeros((len(view.x), 6, 3 * len(turns)))
+        for i, k in enumerate(turns):
             rows = np.flatnonzero(
                 (view.x.position < 0)
                 & (view.x.t > middle[k]) & (view.x.t < middle[k + 1])
@@ -48,10 +50,10 @@ def lost_ways(table: ColumnTable) -> Iterator[Cause]:
                 out[rows, 3 + c, 3 * i + c] = 1.0
         return out
 
-    at = table.add(General("way", columns), 3 * len(known))
-    chance = priors.LOST_TURN_CHANCE / len(known)
-    for i, k in enumerate(known):
-        size = priors.LOST_TURN_RAD / long[k] * np.abs(table.unit[3:])
+    at = table.add(General("way", columns), 3 * len(turns))
+    chance = priors.LOST_TURN_CHANCE / len(turns)
+    for i, k in enumerate(turns):
+        size = priors.LOST_TURN_RAD / seconds[k] * np.abs(table.unit[3:])
         ends = (int(held[k]), int(held[k + 1]))
         own = at + 3 * i + np.arange(3)
         group = Group(f"way {k}", "gyr", own, size, moved_positions=ends, random=True)

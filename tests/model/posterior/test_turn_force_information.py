@@ -11,7 +11,7 @@ import pytest
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.way_information import way_information
+from fieldcal.model.posterior.turn_force_information import turn_force_information
 from fieldcal.model.system.turn_rows import TurnRows
 
 COLUMNS = np.array([3, 5, 8, 9])
@@ -59,7 +59,7 @@ def stacked(turns: list[TurnRows]) -> tuple[Array, Array]:
 def test_rows_that_remain_lead_to_the_same_as_all_of_them() -> None:
     """Laid together with rows of another system, which has but the columns wanted."""
     turns = two_turns(0.9)
-    design, off = way_information(found(), turns, WANTED)
+    design, off = turn_force_information(found(), turns, WANTED)
     assert design.shape == (2, 2)
     rng = np.random.default_rng(2)
     other, seen = rng.normal(size=(5, 2)), rng.normal(size=5)
@@ -76,7 +76,9 @@ def test_rows_that_remain_lead_to_the_same_as_all_of_them() -> None:
 
 
 def test_rows_that_scatter_say_as_much_less() -> None:
-    quiet, loud = (way_information(found(), two_turns(n), WANTED) for n in (0.9, 9.0))
+    quiet, loud = (
+        turn_force_information(found(), two_turns(n), WANTED) for n in (0.9, 9.0)
+    )
     ratio = np.linalg.svd(quiet[0])[1] / np.linalg.svd(loud[0])[1]
     np.testing.assert_allclose(ratio, 9.0, rtol=0.15)
     for design, off in (quiet, loud):
@@ -87,13 +89,13 @@ def test_rows_that_scatter_say_as_much_less() -> None:
 
 def test_a_column_that_no_turn_meets_has_no_row() -> None:
     some = turn(np.ones(6), np.ones((6, 1)), np.array([5]))
-    design, off = way_information(found(), [some], WANTED)
+    design, off = turn_force_information(found(), [some], WANTED)
     assert design.shape == (1, 2) and design[0, 1] == pytest.approx(0.0)
     assert abs(off[0] / design[0, 0]) == pytest.approx(1.0)
 
 
 def test_without_a_way_nothing_remains() -> None:
-    design, off = way_information(found(), [], WANTED)
+    design, off = turn_force_information(found(), [], WANTED)
     assert design.shape == (0, 2) and off.shape == (0,)
 
 

@@ -1,13 +1,18 @@
 """Information of the accelerometers during turns on some columns, others eliminated.
 
-Rows z = A u + B e + n are whitened; u are the columns wanted, e the others, of standard
-deviations S. With P = A^T A - A^T B (S^-2 + B^T B)^-1 B^T A, and b likewise of z, what
-remains of the rows is
+The whitened rows are z = A u + B e + n with the wanted parameters u, the other
+parameters e of prior standard deviations S, and unit noise n. Elimination of e gives
+
+    P = A^T A - A^T B (S^-2 + B^T B)^-1 B^T A
+    b = A^T z - A^T B (S^-2 + B^T B)^-1 B^T z
+
+so that the rows depend on u by
 
     |P^1/2 u - P^-1/2 b|^2                                                          (1)
 
-so that another system can have it as rows of its own. If the rows scatter by more than
-their noise, (1) is divided by as much. Source: elimination by a Schur complement.
+Another system of equations can include P^1/2 u = P^-1/2 b as further rows. If the mean
+square of the residuals exceeds one, (1) is divided by it. Source: elimination by a
+Schur complement.
 """
 
 from __future__ import annotations
@@ -21,10 +26,10 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.system.turn_rows import TurnRows
 
 MIN_EIGENVALUE = 1e-6
-"""Part of the largest eigenvalue of P below which rounding made one."""
+"""Eigenvalues of P below this part of the largest one are numerical errors."""
 
 
-def way_information(
+def turn_force_information(
     fitted: Set, turned: Sequence[TurnRows], wanted: Index
 ) -> tuple[Array, Array]:
     """Rows (1) of some columns.
@@ -33,16 +38,17 @@ def way_information(
     ----------
     fitted : set with the columns and their sizes
     turned : rows of the turns
-    wanted : (k,) columns
+    wanted : (k,) columns u
 
     Returns
     -------
-    (m, k) design and (m,) values, m <= k: none if the turns have no information
+    (m, k) design P^1/2 and (m,) values P^-1/2 b; m <= k is the number of directions
+    of u on which the turns have information, 0 if there are none
 
     """
     columns, first = np.unique(fitted.state.columns, return_index=True)
     sizes = fitted.state.prior_sigma[first]
-    parts = [_way_design(t, columns) for t in turned]
+    parts = [_turn_force_design(t, columns) for t in turned]
     design = np.vstack([np.zeros((0, len(columns))), *parts])
     white = np.concatenate([np.zeros(0), *(t.way for t in turned)])
     ours = np.isin(columns, wanted)
@@ -62,8 +68,8 @@ def way_information(
     return out, off / wide
 
 
-def _way_design(turn: TurnRows, columns: Index) -> Array:
-    """Design of the way of a turn by all columns of a set, (r, all)."""
+def _turn_force_design(turn: TurnRows, columns: Index) -> Array:
+    """Design (r, c) of the r rows during a turn by the c columns of a set."""
     out = np.zeros((len(turn.way), len(columns)))
     shared = np.isin(turn.columns, columns)
     at = np.searchsorted(columns, turn.columns[shared])

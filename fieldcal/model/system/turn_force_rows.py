@@ -1,9 +1,9 @@
 """Rows of the accelerometers during a turn from one window to the next.
 
-They determine columns that no window shows. Columns that windows show have the windows'
-estimates and uncertainties, since during a turn the attitude is known by interpolation
-only, (2) of `turn`. The white noise of the gyroscopes of density N makes phi_k - u
-phi_T a bridge with the covariance
+They determine only columns that no window shows. Columns that windows show keep the
+estimates and uncertainties of the windows, because during a turn the attitude is known
+by interpolation only, (2) of `turn`. White noise of the gyroscopes with the density N,
+rad/s/sqrt(Hz), makes phi_k - u phi_T a Brownian bridge with the covariance, rad^2,
 
     N^2 (min(t, t') - u' t - u t' + u u' T)                                         (1)
 """
@@ -26,7 +26,7 @@ from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience import Experience
 
 
-class WayRows:
+class TurnForceRows:
     """Rows of the accelerometers of one turn.
 
     Parameters
@@ -154,10 +154,10 @@ class WayRows:
         return out
 
 
-def seen_on_the_way(
+def turn_force_columns(
     columns: Index, dictionary: Dictionary, known: Set
 ) -> NDArray[np.bool_]:
-    """Columns that no window shows, or that the windows' set holds."""
+    """Columns used during turns: no window shows them, or the windows' set has them."""
     held = np.isin(columns, known.state.columns)
     out: NDArray[np.bool_] = held | ~dictionary.shown[columns]
     return out

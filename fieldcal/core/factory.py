@@ -21,7 +21,8 @@ warms up is assumed, exp(-t / tau).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import inf
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
@@ -70,13 +71,14 @@ class FactoryErrors:
     warming_k: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, largest in IMPOSSIBLE_SIZES.items():
-            size = getattr(self, name)
+        for name in (each.name for each in fields(self)):
+            size, largest = getattr(self, name), IMPOSSIBLE_SIZES.get(name, inf)
             if not 0 <= size < largest:
-                said = "squareness" if name == "cross_coupling" else name
+                stated = "squareness" if name == "cross_coupling" else name
+                below = f" and below {largest:g}" if largest < inf else ""
                 raise InputError(
-                    f"{said} {size:g} is none: give the 1σ of a coefficient in SI"
-                    f" units, 0 or more and below {largest:g}"
+                    f"{stated} {size:g} is none: give the 1σ of a coefficient in SI"
+                    f" units, 0 or more{below}"
                 )
 
     @property

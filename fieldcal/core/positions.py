@@ -82,7 +82,8 @@ class Position:
         """Alpha and beta in degrees; None if unknown or with a third angle."""
         if self.alpha is None or self.beta is None or self.gamma:
             return None
-        alpha, beta = np.rad2deg([self.alpha, self.beta]).round(9).tolist()
+        angles = np.rad2deg([self.alpha, self.beta]).round(9) + 0.0  # no -0.0
+        alpha, beta = angles.tolist()
         return alpha, beta
 
 

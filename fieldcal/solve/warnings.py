@@ -102,12 +102,13 @@ def _gyroscope_warning(
     estimate: ParameterEstimate,
 ) -> str:
     """Gyroscope parameters that turns or rates do not determine, with the remedy."""
-    missing = [*gyr] + ([f"{len(cross)} of 6 gyro_cross_coupling"] if cross else [])
+    coefficients = f"gyro_cross_coupling ({len(cross)} of its 6 coefficients)"
+    missing = [*gyr, *([coefficients] if cross else [])]
     if not estimate.parameter_set.options.turned and not observations.rotating.any():
         return (
             f"{join_words(missing)} {'are' if missing[1:] else 'is'} not estimated:"
-            " the Earth's rate gives it only roughly in these windows; average longer,"
-            f" or {words.RECORD_TURNS}"
+            f" the Earth's rate shows {'them' if missing[1:] else 'it'} only roughly in"
+            f" these windows; average longer, or {words.RECORD_TURNS}"
         )
     turned = {ParameterName.of(n).entry[1] for n in cross}
     turned |= {ParameterName.of(n).axis for n in gyr}

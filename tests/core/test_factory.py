@@ -75,3 +75,10 @@ def test_the_bound_itself_is_refused_and_what_is_below_it_is_not(name: str) -> N
         FactoryErrors(**{name: bound})
     below = math.nextafter(bound, 0.0)
     assert FactoryErrors(**{name: below}).by_effect[name] == below
+
+
+@pytest.mark.parametrize("name", ["acc_per_k", "gyr_per_k", "hysteresis", "warming_k"])
+@pytest.mark.parametrize("size", [-1e-9, math.nan, math.inf])
+def test_no_size_is_negative_or_without_end(name: str, size: float) -> None:
+    with pytest.raises(InputError, match=rf"{name} {size:g} is none.*0 or more"):
+        FactoryErrors(**{name: size})

@@ -18,19 +18,20 @@ from fieldcal.solve.options import SolveOptions
     ("turned", "rates", "gyr", "cross", "says"),
     [
         (False, False, ["gyr_scale.x"], [],
-         "gyr_scale.x is not estimated: the Earth's rate gives it only roughly in these"
+         "gyr_scale.x is not estimated: the Earth's rate shows it only roughly in these"
          " windows; average longer, or record the turns between the positions, each"
          " within 60 s and without a gap"),
         (False, False, ["gyr_scale.x", "gyr_scale.y"], [],
-         "gyr_scale.x and gyr_scale.y are not estimated: the Earth's rate gives it only"
-         " roughly in these windows; average longer, or record the turns between the"
-         " positions, each within 60 s and without a gap"),
+         "gyr_scale.x and gyr_scale.y are not estimated: the Earth's rate shows them"
+         " only roughly in these windows; average longer, or record the turns between"
+         " the positions, each within 60 s and without a gap"),
         (True, False, ["gyr_scale.y"], ["gyro_cross_coupling.s13"],
-         "gyr_scale.y and 1 of 6 gyro_cross_coupling are not determined by these turns:"
-         " add turns about device axis y and z while that axis is level"),
+         "gyr_scale.y and gyro_cross_coupling (1 of its 6 coefficients) are not"
+         " determined by these turns: add turns about device axis y and z while that"
+         " axis is level"),
         (False, True, [], ["gyro_cross_coupling.s21", "gyro_cross_coupling.s31"],
-         "2 of 6 gyro_cross_coupling is not determined by this schedule: add a rate of"
-         " 20°/s about device axis x"),
+         "gyro_cross_coupling (2 of its 6 coefficients) is not determined by this"
+         " schedule: add a rate of 20°/s about device axis x"),
     ],
 )  # fmt: skip
 def test_what_turns_or_rates_leave_open(
@@ -201,7 +202,8 @@ def test_of_lengths_alone_orientations_are_what_is_missing() -> None:
 
 def test_each_matrix_of_the_gyroscopes_is_told_by_itself() -> None:
     of_one = {"gyr_scale.y": "gyr_scale.y",
-              "gyro_cross_coupling.s12": "1 of 6 gyro_cross_coupling"}  # fmt: skip
+              "gyro_cross_coupling.s12":
+              "gyro_cross_coupling (1 of its 6 coefficients)"}  # fmt: skip
     for name, what in of_one.items():
         found = open_estimate(name)
         found.parameter_set.options.turned = True

@@ -15,7 +15,11 @@ from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.wording.lines import format_probability, verdict_probability
+from fieldcal.diagnosis.wording.lines import (
+    calibration_holds,
+    format_probability,
+    verdict_probability,
+)
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 if TYPE_CHECKING:
@@ -190,6 +194,8 @@ def _print_details(console: Console, diagnosis: Diagnosis) -> None:
             console.print(_parameter_table(found))
     console.print(_agreement_table(diagnosis))
     console.print(_calibration_table(diagnosis))
+    if holds := calibration_holds(found.id for found in diagnosis.effects):
+        console.print(holds, markup=False)
 
 
 def _mismatch_table(mismatch: tuple[Mismatch, ...]) -> object:

@@ -187,6 +187,12 @@ def _without_constant_temperature(rows: Rows, warmth: Thermometer) -> Rows:
 def _refuse_empty(block: Block, about: Description) -> None:
     windows = window_bounds(block, about)
     if not (windows[:, 1] - windows[:, 0] >= MIN_WINDOW_SAMPLES).any():
+        if not about.positions:
+            raise InputError(
+                f"session.toml has no [[position]], and {len(block)} samples are less"
+                f" than the {MIN_WINDOW_SAMPLES} of the shortest window: record longer,"
+                " or at a higher rate"
+            )
         held = len(about.positions)
         raise InputError(
             f"none of the {held} windows in session.toml holds"

@@ -26,6 +26,7 @@ class BiasDrift(BiasChange):
     params = six("m/s^2/s", 1e-4, "rad/s/s", 5e-6)
     covariate = "time"
     seen_in = "time"
+    absent = "at the start"
     decided_by = "the first position once more at the end"
     cure = (
         "Take the first position again at the end, so that the drift can be "

@@ -30,6 +30,7 @@ class BiasStep(BiasChange):
     shapes = (Shape("at_s", "s", -np.inf, np.inf, "instant"),)
     covariate = "time"
     seen_in = "time"
+    absent = "before the step"
     decided_by = "the position before the jump once more"
     cure = (
         "Look for what happened at that instant (supply, range, a knock), and "

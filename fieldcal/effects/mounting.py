@@ -30,7 +30,7 @@ from itertools import pairwise
 import numpy as np
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Block, Index
 from fieldcal.core.sampling import has_no_pause, sampling_rate
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
@@ -59,6 +59,9 @@ are 17 apart and more."""
 
 MIN_TURN_RAD = np.deg2rad(10.0)
 """Smallest turn of the force that is used, rad."""
+
+MARGIN_S = 30.0
+"""Longest part of a window beside a turn that is searched for turning, s."""
 
 
 def turned_axes(measured: Array, f: Array) -> tuple[Array, float]:
@@ -114,7 +117,8 @@ def measured_turns(
 ) -> list[ObservedTurn]:
     """Turns between windows by number, where the force is f (n, 3).
 
-    Those that are too small, or of which a part was not recorded, say nothing.
+    Those that are too small, of which a part was not recorded, or that lie mostly
+    inside the windows, as where these were stated roughly, say nothing.
     """
     block, out = recording.block, []
     often = sampling_rate(block)
@@ -124,11 +128,40 @@ def measured_turns(
             continue
         if not has_no_pause(block.t, gap.start, gap.stop, often):
             continue
+        if _turns_in_windows(recording, p, q):
+            continue
         rest = recording.mean(p)[3:]
         rate = (block.gyr[gap] - rest) / recording.scale[3:]
         middle = (rate[1:] + rate[:-1]) / 2
         out.append(ObservedTurn(one, two, middle * np.diff(block.t[gap])[:, None]))
     return out
+
+
+def _turns_in_windows(recording: CheckedSamples, p: int, q: int) -> bool:
+    """Whether the gyroscopes turn further inside two windows than between them.
+
+    Both are in the unit of the outputs, so that it does not matter.
+    """
+    block = recording.block
+    (first, end), (start, last) = recording.windows[[p, q]].tolist()
+    early, late = (end - first) // 3, (last - start) // 3
+    # the middle of a window is at rest even if the window was stated roughly
+    rests = [block.gyr[first + early : end - early].mean(axis=0),
+             block.gyr[start + late : last - late].mean(axis=0)]  # fmt: skip
+    edges = np.searchsorted(
+        block.t, [block.t[end - 1] - MARGIN_S, block.t[start] + MARGIN_S]
+    ).tolist()
+    inside = _angle(block, slice(max(end - early, edges[0]), end), rests[0])
+    inside += _angle(block, slice(start, min(start + late, edges[1])), rests[1])
+    between = _angle(block, slice(end, start), rests[0])
+    return float(np.linalg.norm(inside)) > float(np.linalg.norm(between))
+
+
+def _angle(block: Block, rows: slice, rest: Array) -> Array:
+    """Integral (3,) of the rates of some samples against those at rest."""
+    rate = block.gyr[rows][1:] - rest
+    total: Array = np.nansum(rate * np.diff(block.t[rows])[:, None], axis=0)
+    return total
 
 
 def rate_unit(turns: Sequence[ObservedTurn]) -> str:
@@ -195,7 +228,9 @@ class Mounting(Chain):
     place = 1  # a channel with wrong bytes looks like one of another axis
     decided_by = "the drawing on the device, and its data sheet"
     cure = (
-        "Correct [frame] mounting, or the unit, by the drawing on the device; where"
+        "Correct [frame] mounting by the drawing on the device. Of another unit, import"
+        " again with --acc-unit or --gyr-unit, or state it in the device's address."
+        " Where"
         " gyr_axes says that gx gy gz lie along other axes than the accelerometers',"
         " import again with --columns that name them so, such as -gy,gx,gz. Write"
         " angles in degrees."

@@ -24,6 +24,7 @@ class RandomWalk(Scatter):
     params = six("m/s^2/sqrt(s)", 3e-4, "rad/s/sqrt(s)", 3e-5)
     covariate = "scatter between windows beyond white noise"
     seen_in = "time"
+    absent = "on average"
     decided_by = "one position held for an hour, and its Allan deviation"
     cure = (
         "Nothing takes it out: average no longer than the Allan deviation "

@@ -27,6 +27,7 @@ class TemperatureBias(BiasChange):
     params = six("m/s^2/K", 1.5e-2, "rad/s/K", 5e-4)
     covariate = "temperature"
     seen_in = "temperature"
+    absent = "at the start's temperature"
     decided_by = "the same position again at another temperature"
     cure = (
         "Wait until the temperature stands still, or record while it changes "

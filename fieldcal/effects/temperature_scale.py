@@ -28,6 +28,7 @@ class TemperatureScale(Sensor):
     params = tuple(Param(i, "1/K", 3e-4) for i in "xyz")
     covariate = "temperature × force"
     seen_in = "temperature"
+    absent = "at the start's temperature"
     decided_by = "the axis up and down, cold and warm"
     cure = "Calibrate at the temperature of use, or apply the coefficients."
     source = "IEEE Std 1293; 1e-5 to 3e-4 on MEMS parts"

@@ -31,6 +31,7 @@ class WarmUp(BiasChange):
     shapes = (Shape("tau_s", "s", 30.0, 4000.0, "session"),)
     covariate = "time since the start"
     seen_in = "time"
+    absent = "when warmed up"
     decided_by = "a longer recording, until the change has died out"
     cure = "Switch the device on earlier: three times tau_s before the first window."
     source = "first-order warm-up of a package, 100 to 2000 s"

@@ -182,9 +182,16 @@ def with_description_faults(
         if isinstance(effect, Chain) and effect.misread:
             values = ", ".join(f"{k} = {v}" for k, v in fault.values.items())
             mended = fault.mended is not None
+            mend = "mend it and solve again"
+            if "unit" in fault.values:  # the samples are SI: no file states it
+                sensor = "gyr" if fault.channel.startswith("g") else "acc"
+                mend = (
+                    f"import it again with --{sensor}-unit, or record it again with"
+                    f" {sensor}_unit in the device's address, and solve again"
+                )
             sentences.append(
-                f"session.toml is wrong about the {name} ({values}): mend it and solve"
-                " again; the numbers are those of"
+                f"session.toml is wrong about the {name} ({values}): {mend};"
+                " the numbers are those of"
                 f" {'samples that were put right' if mended else 'what it states'}"
             )
     if not sentences:

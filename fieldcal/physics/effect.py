@@ -100,6 +100,10 @@ class Effect(ABC):
     """Parameters with those that they become in a device that is turned as a whole:
     where nobody knows how it stands, the rows show the sum of the two."""
 
+    absent: ClassVar[str] = ""
+    """When it adds nothing to biases and scale factors that it changes, in words: they
+    are fitted beside it as they are then. Empty for an effect that does not change."""
+
     decided_by: ClassVar[str]
     cure: ClassVar[str]
     source: ClassVar[str]

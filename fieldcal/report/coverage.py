@@ -21,7 +21,7 @@ from fieldcal.report.blocks import Figure, Paragraph, Section
 from fieldcal.report.blocks import ReportBlock as ReportBlock
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import ReportMaterial
-from fieldcal.report.gravity_norm import calibrated_forces
+from fieldcal.report.gravity_norm import calibrated_forces, missing_coupling
 
 GRID = 4000
 """Directions that are looked at: 3 degrees apart."""
@@ -116,6 +116,7 @@ def coverage_section(material: ReportMaterial) -> Section | None:
             f"{said[0].upper()}{said[1:]}. There the calibrated force is known to"
             f" ± {worst:.2g} m/s², at best in any direction to ± {best:.2g} m/s²."
         ),
+        *missing_coupling(found),
         Figure(chart, "Equal areas of the sphere are equal here."),
     )
     return Section("coverage", "What the positions cover", blocks)

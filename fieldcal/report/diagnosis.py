@@ -20,7 +20,7 @@ from fieldcal.calibration.wording import (
     position_numbers,
 )
 from fieldcal.core.samples import CHANNELS, common_unit
-from fieldcal.diagnosis.wording.lines import verdict_probability
+from fieldcal.diagnosis.wording.lines import calibration_holds, verdict_probability
 from fieldcal.report import evidence
 from fieldcal.report.blocks import (
     Cell,
@@ -89,7 +89,8 @@ def diagnosis_section(material: ReportMaterial) -> Section | None:
     blocks += evidence.residual_curves(objects_at(found, "curves"))
     if effects:
         blocks.append(_effects(effects))
-        blocks += _calibration(table_at(found, "calibration"))
+        names = [str(e.get("id", "")) for e in effects]
+        blocks += _calibration(table_at(found, "calibration"), names)
     blocks += evidence.twin_replay(table_at(found, "twin"))
     blocks += evidence.candidate_table(objects_at(found, "candidates"))
     return Section("diagnosis", "Diagnosis", tuple(blocks))
@@ -237,7 +238,8 @@ def _by_channel(before: Json, after: Json) -> Chart | None:
     )
 
 
-def _calibration(groups: Json) -> list[ReportBlock]:
+def _calibration(groups: Json, effects: Sequence[str]) -> list[ReportBlock]:
+    """Biases and scale factors beside effects, given by id, and when they hold."""
     rows: list[list[str]] = []
     for name, group in groups.items():
         if not isinstance(group, Mapping):
@@ -251,4 +253,8 @@ def _calibration(groups: Json) -> list[ReportBlock]:
     if not rows:
         return []
     columns = ("parameter", ">value", ">± 1σ", "unit")
-    return [table("Calibration with the effects", columns, rows)]
+    holds = calibration_holds(effects)
+    return [
+        table("Calibration with the effects", columns, rows),
+        *([Paragraph(holds)] if holds else []),
+    ]

@@ -100,7 +100,8 @@ def _agreement(places: Sequence[Json], name: str) -> Array:
 
 def candidate_table(found: Sequence[Json]) -> list[ReportBlock]:
     """Table of every effect that was tried, with the reason if it was rejected."""
-    columns = ("effect", ">Δχ²", ">ΔBIC", ">held-out rms", "why")
+    # of each as the only cause; those of an effect beside all others stand above
+    columns = ("effect", ">Δχ² alone", ">ΔBIC alone", ">held-out rms", "why")
     rows: list[list[str | Cell]] = [
         [
             str(c.get("id", "")).replace("_", " "),

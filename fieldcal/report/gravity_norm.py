@@ -13,8 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import UsableWindows, build_observations
+from fieldcal.model import thresholds
 from fieldcal.report.blocks import Figure, Paragraph, Section
 from fieldcal.report.blocks import ReportBlock as ReportBlock
 from fieldcal.report.charts import Axis, Chart, Series
@@ -85,6 +87,26 @@ def norm_errors(material: ReportMaterial) -> NormErrors | None:
     return NormErrors(still.position_numbers, before, after, np.sqrt(spread))
 
 
+def missing_coupling(found: Calibration | None) -> tuple[Paragraph, ...]:
+    """Remark if a result has no cross-coupling although its recording shows some.
+
+    The fit of bias and scale factor took it into account, so their residuals and
+    uncertainties do not show it; what is calibrated with them alone still has it.
+    """
+    if found is None or any(n.startswith("cross_coupling.") for n in found.names):
+        return ()
+    causes = found.info.get("carried", {}).get("causes", {})
+    if causes.get("cross_coupling", 0.0) < thresholds.NAMED:
+        return ()
+    return (
+        Paragraph(
+            "The recording shows cross-coupling, and this result has no coefficients"
+            " of it: a force calibrated with bias and scale factor alone is off by it,"
+            " which no ± here includes. fieldcal solve --cross adds them."
+        ),
+    )
+
+
 def gravity_norm_section(material: ReportMaterial) -> Section | None:
     """Chart of the norm less gravity, before and after calibration, by position."""
     errors = norm_errors(material)
@@ -113,6 +135,7 @@ def gravity_norm_section(material: ReportMaterial) -> Section | None:
             "At rest the accelerometers feel gravity and nothing else, wherever they"
             f" point. Their norm misses it by {said}."
         ),
+        *missing_coupling(material.calibration),
         Figure(chart, "± is one standard error of the window's mean."),
     )
     return Section("gravity", "Gravity, before and after", blocks)

@@ -144,7 +144,7 @@ def explain_no_stretch(rows: CellRows, origin: Array) -> str:
 
     """
     if len(rows) < 2 * SPREAD_CELLS:
-        return f"it lasts less than {2 * SPREAD_CELLS * CELL:g} s"
+        return _explain_few_cells(rows)
     rows = LiveAxisRows(rows)
     runs = find_rest_runs(rows, StillnessLimits().noise)
     if not runs:
@@ -155,6 +155,18 @@ def explain_no_stretch(rows: CellRows, origin: Array) -> str:
     worst = judge_window(cells, StillnessLimits()).worst
     text = f"its calmest part, {start:.1f} to {end:.1f} s, "
     return text + (str(worst.as_error(start)) if worst.ratio > 1 else "is too short")
+
+
+def _explain_few_cells(rows: CellRows) -> str:
+    """Say of a recording with few cells whether it is short or its samples are rare."""
+    least = 2 * SPREAD_CELLS
+    starts = rows[: len(rows)][:, 0]
+    if len(starts) and starts[-1] - starts[0] >= least * CELL:
+        return (
+            f"its samples are too rare: they lie in {len(starts)} tenths of a second,"
+            f" and {least} are needed"
+        )
+    return f"it lasts less than {least * CELL:g} s"
 
 
 def _passes_clearly(cells: CellTable, shortest: float) -> tuple[float, float] | None:

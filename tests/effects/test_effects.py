@@ -82,6 +82,18 @@ def test_says_what_it_is(effect: Effect) -> None:
     assert all(effect.unit(name) for name in effect.names)
 
 
+@pytest.mark.parametrize("effect", [e for e in FITTED if e.absent], ids=lambda e: e.id)
+def test_adds_nothing_when_it_is_said_to_be_absent(effect: Sensor) -> None:
+    """After a warm-up, at the start and its temperature, before a step."""
+    place = {"since_start": 1e6 if effect.id == "warm_up" else 0.0, "warming": 0.0}
+    x = Experience.at_rest(
+        np.zeros(1), np.zeros(1), 9.8, **{k: np.full(1, v) for k, v in place.items()}
+    )
+    assert not effect.design(x, SHAPE | {"tau_s": 100.0, "at_s": 1.0}).any()
+    later = replace(x, t=x.t + 9, since_start=x.t + 9, warming=x.warming + 9)
+    assert effect.design(later, SHAPE | {"tau_s": 100.0, "at_s": 1.0}).any()
+
+
 @every_effect
 def test_has_a_known_answer(effect: Effect) -> None:
     failed, tried = doctest.testmod(sys.modules[type(effect).__module__])

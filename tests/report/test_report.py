@@ -24,7 +24,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.report import EarlierCalibration, ReportMaterial, gather, packing, render
 from fieldcal.report.agreement import correlation_matrix
 from fieldcal.report.blocks import Figure
-from fieldcal.report.gravity_norm import norm_errors
+from fieldcal.report.gravity_norm import missing_coupling, norm_errors
 from fieldcal.report.packing import MISSING, PIECE, ChannelTable, pack, quantise
 from fieldcal.report.residuals import measured_angles, window_residuals
 from fieldcal.report.stillness import motion_by_second
@@ -329,6 +329,25 @@ def test_the_norm_misses_gravity_by_bias_and_scale_before(
     assert "Gravity, before and after" in Tags(render(material)).text
 
 
+@pytest.mark.parametrize(
+    ("share", "fitted"), [(0.99, False), (0.1, False), (0.99, True)]
+)
+def test_cross_coupling_that_a_result_lacks_is_said(
+    share: float, fitted: bool, material: ReportMaterial
+) -> None:
+    """Its ± and residuals are of a fit that had it; the calibrated norm lacks it."""
+    found = material.calibration
+    assert found is not None
+    info = dict(found.info) | {"carried": {"causes": {"cross_coupling": share}}}
+    renamed = ("cross_coupling.k12", *found.names[1:]) if fitted else found.names
+    other = replace(found, info=info, names=renamed)
+    remarks = missing_coupling(other)
+    assert bool(remarks) == (share > 0.5 and not fitted)
+    if remarks:
+        page = Tags(render(replace(material, calibration=other))).text
+        assert "this result has no coefficients of it" in page
+
+
 def test_restlessness_is_told_by_the_quietest_tenth() -> None:
     """Noise that is twenty times as strong in a third of the time."""
     t = np.arange(6000) / 100
@@ -378,6 +397,19 @@ def test_a_diagnosis_of_any_shape_gives_a_section(
     for block in section.blocks:
         if isinstance(block, Figure):
             json.dumps(block.chart.to_json(), allow_nan=False)
+
+
+def test_numbers_that_differ_have_names_that_differ(material: ReportMaterial) -> None:
+    """Biases beside a drift are those of the start, an effect's gain is not alone."""
+    group = {"value": [0.1, 0.2, 0.3], "sigma": [0.01] * 3, "unit": "m/s^2"}
+    document = {
+        "effects": [{"id": "bias_drift", "evidence": {"delta_chi2": 90.0}}],
+        "calibration": {"acc_bias": group},
+        "candidates": [{"id": "bias_drift", "delta_chi2": 7.0, "chosen": True}],
+    }
+    page = Tags(render(replace(material, diagnosis=document))).text
+    assert "without the effects (at the start); fieldcal solve states them" in page
+    assert "Δχ² alone" in page and "ΔBIC alone" in page
 
 
 def test_a_comparison_with_a_simulator_is_a_section(material: ReportMaterial) -> None:

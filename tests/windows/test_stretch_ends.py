@@ -61,7 +61,8 @@ def turned_slowly(rate: float) -> Block:
 @pytest.mark.parametrize(
     ("block", "says"),
     [(turned_slowly(0.005), "s, creeping on ax"),
-     (turned_slowly(1.0)[:80], "less than")],
+     (turned_slowly(1.0)[:80], "less than"),
+     (turned_slowly(1.0)[:: round(RATE)][:6], "in 6 tenths of a second, and 20")],
 )  # fmt: skip
 def test_why_there_is_none_is_said(block: Block, says: str) -> None:
     assert not still_stretches(block)

@@ -123,7 +123,26 @@ def _calibration_change(finding: FoundEffect) -> str:
         return f"less than {thresholds.MOVED:g} σ"
     unit = format_unit(most.unit)
     by = f"{most.value:+.2g} {unit}".rstrip()
-    return f"{parameter_title(name)} {by} ({sigmas:.0f} σ)"
+    return f"{parameter_title(name)} {by} ({sigmas:.0f} σ) {effect.absent}".rstrip()
+
+
+def calibration_holds(names: Iterable[str]) -> str:
+    """When the biases and scale factors that are fitted beside some effects hold.
+
+    Empty if none of the effects changes them during a recording; ids that are not in
+    the catalogue are passed over.
+
+    >>> calibration_holds(["bias_drift", "quadratic", "warm_up"]).partition(";")[0]
+    'Biases and scale factors are without the effects (at the start, when warmed up)'
+    """
+    known = (catalogue()[name].absent for name in names if name in catalogue())
+    when = [text for text in dict.fromkeys(known) if text]
+    if not when:
+        return ""
+    return (
+        f"Biases and scale factors are without the effects ({', '.join(when)});"
+        " fieldcal solve states them for the end of the recording."
+    )
 
 
 def verdict_probability(verdict: str, probability: float, named: int) -> str:

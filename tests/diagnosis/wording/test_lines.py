@@ -34,3 +34,13 @@ def test_one_that_happened_often_stays_one_line_in_its_place() -> None:
     assert [one.does for one in told] == [
         "acc bias z +0.01 m/s² (10 σ)", "nothing: left out",
     ]  # fmt: skip
+
+
+def test_a_bias_that_changes_is_told_with_when_it_holds() -> None:
+    """Its value at the start may differ from the mean the other way than at the end."""
+    found = [_found("temperature_bias", x=(0.01, 0.001)), _found("warm_up")]
+    does = [one.does for one in effect_lines(found)]
+    assert does == [
+        "acc bias x +0.01 m/s² (10 σ) at the start's temperature",
+        "nothing that shows",
+    ]

@@ -66,8 +66,8 @@ def misdirected_turns(turns: Sequence[tuple[str, str]]) -> list[str]:
         f"in {count} turn{'s' if count > 1 else ''} the gyroscopes lead to another"
         f" attitude than the accelerometers or the stated angles (from"
         f" {join_words(named)}{f', and {more} more' if more else ''}): an axis, a sign,"
-        " a unit or an angle is another than session.toml says, or the gyroscopes were"
-        " clipped; mend it, or turn more slowly"
+        " a unit or an angle is another than session.toml says, samples of the turn are"
+        " missing, or the gyroscopes were clipped; mend it, or turn more slowly"
     ]
 
 

@@ -31,7 +31,10 @@ class GyroCrossCoupling(Sensor):
     usual = True
     covariate = "rate about the other axes"
     decided_by = "a turn about each axis in turn, by 90° or more"
-    cure = "Let solve use the turns (--turns yes), or a rate table."
+    cure = (
+        "Apply the cross-coupling of the gyroscopes that solve states, by the turns"
+        " (if it states none, --turns yes) or by a rate table."
+    )
     source = "Avrutov et al. 2017, (3.1); MEMS data sheets state 0.1 to 2 %"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -32,7 +32,10 @@ class GyroScale(Sensor):
     usual = True
     covariate = "angle turned"
     decided_by = "a turn about each axis in turn, by 90° or more"
-    cure = "Let solve use the turns between the positions (--turns yes)."
+    cure = (
+        "Apply the scale factors of the gyroscopes that solve states; it estimates"
+        " them from the turns (if it states none, --turns yes)."
+    )
     source = "Avrutov et al. 2017, (3.1); MEMS data sheets state 0.1 to 3 %"
 
     def applies(self, x: Experience) -> bool:

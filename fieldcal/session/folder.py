@@ -236,7 +236,8 @@ class Session:
 def _guess_warnings(raw: Mapping[str, Any]) -> list[str]:
     """Warnings about values that an import guessed and the user has not confirmed."""
     return [
-        f"{what.replace('_', ' ')} was taken as {why}: confirm it by deleting {what}"
+        f"{what.replace('_', ' ')} {'were' if what == 'columns' else 'was'} taken as"
+        f" {why}: confirm it by deleting {what}"
         f" under [guessed] in {DESCRIPTION}, or import again and say what it is"
         for what, why in raw.get("guessed", {}).items()
     ]

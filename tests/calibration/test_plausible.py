@@ -49,8 +49,9 @@ def test_turns_that_led_elsewhere_are_named_three_by_three() -> None:
     names = [f"position {i}" for i in range(1, 6)]
     pairs = list(pairwise(names))
     after = (
-        ": an axis, a sign, a unit or an angle is another than session.toml says, or"
-        " the gyroscopes were clipped; mend it, or turn more slowly"
+        ": an axis, a sign, a unit or an angle is another than session.toml says,"
+        " samples of the turn are missing, or the gyroscopes were clipped; mend it, or"
+        " turn more slowly"
     )
     said = "the gyroscopes lead to another attitude than the accelerometers or the"
     for count, start, listed in (

@@ -94,6 +94,12 @@ def test_adds_nothing_when_it_is_said_to_be_absent(effect: Sensor) -> None:
     assert effect.design(later, SHAPE | {"tau_s": 100.0, "at_s": 1.0}).any()
 
 
+@pytest.mark.parametrize("name", ["gyro_scale", "gyro_cross_coupling"])
+def test_what_solve_does_by_itself_is_no_remedy(name: str) -> None:
+    """`--turns` is auto: whoever has solved has used the turns already."""
+    assert EFFECTS[name].cure.startswith("Apply")
+
+
 @every_effect
 def test_has_a_known_answer(effect: Effect) -> None:
     failed, tried = doctest.testmod(sys.modules[type(effect).__module__])

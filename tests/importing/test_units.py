@@ -101,6 +101,12 @@ def test_a_guess_is_shown_until_it_is_confirmed(
         assert "acceleration was taken as g: |a| at rest is" in said
     about = folder / "session.toml"
     text = about.read_text()
+    about.write_text(text.replace("acceleration =", "columns ="))
+    main(["solve", str(folder)])
+    assert "columns were taken as g: |a|" in " ".join(capsys.readouterr().out.split())
+    about.write_text(text)
+    about = folder / "session.toml"
+    text = about.read_text()
     kept = [line for line in text.split("\n") if not line.startswith("acceleration =")]
     assert len(kept) == text.count("\n")
     about.write_text("\n".join(kept))

@@ -174,10 +174,13 @@ def solve_session(
 ) -> Calibration:
     """Solve a session.
 
-    Parameters ---------- session : the recording windows : its usable windows turns :
-    whether the turns between windows are used; "yes" requires them left : sizes of the
-    factory errors by the keys of session.toml; they replace those in
-        session.toml and those of the grade
+    Parameters
+    ----------
+    session : the recording
+    windows : its usable windows
+    turns : whether the turns between windows are used; "yes" requires them
+    left : sizes of the factory errors by the keys of session.toml; they replace those
+        in session.toml and those of the grade
     options : arguments of `fieldcal.solve.solve`; defaults for the level of the base
         and the setting of angles come from session.toml, or from the grade
 

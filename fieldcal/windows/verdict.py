@@ -76,13 +76,13 @@ class Departure:
         """Return the error for a window that began at `start`, s of device time."""
         axis = CHANNELS[self.channel]
         unit = "m/s²" if self.channel < 3 else "rad/s"
-        size = f"{self.size:+.2g} ± {self.noise:.1g} {unit}"
+        size = f"{_with_noise(self.size, self.noise)} {unit}"
         when = f"disturbed {self.at - start:.1f} s into the window on {axis}"
         noise = f"where the noise is {self.noise:.1g} {unit}"
         if self.noise > 0:
             noise = f"{abs(self.size) / self.noise:.0f} times the noise"
         says = {
-            "push": f"{when}: a {self.seconds:.1f} s push of {size}, {noise}",
+            "push": f"{when}: {self._push(size)}, {noise}",
             "step": f"{when}: a lasting change of {size}, {noise}",
             "shake": f"{when}: shaken for {self.seconds:.1f} s by {self.size:.2g} "
             f"{unit}, {noise}",
@@ -93,6 +93,25 @@ class Departure:
             f"{self.at - start:.1f} s into the window: its sensor is stuck",
         }
         return Moved(says[self.kind], self.at, axis, self.seconds)
+
+    def _push(self, size: str) -> str:
+        """What pushed the output: a force, or a turn of the device."""
+        if self.channel < 3:
+            return f"a {self.seconds:.1f} s push of {size}"
+        return f"a {self.seconds:.1f} s turn at {size}"
+
+
+def _with_noise(size: float, noise: float) -> str:
+    """A departure to the first digit of its standard deviation.
+
+    >>> _with_noise(0.2, 1.2e-4), _with_noise(0.31, 0.02), _with_noise(0.31, 0.0)
+    ('+0.2000 ± 0.0001', '+0.31 ± 0.02', '+0.31 ± 0')
+    """
+    if not noise > 0:
+        return f"{size:+.2g} ± 0"
+    shown = float(f"{noise:.1g}")
+    digits = max(0, -int(np.floor(np.log10(shown))))
+    return f"{size:+.{digits}f} ± {shown:.{digits}f}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -257,12 +257,17 @@ def said(departure: Departure) -> str:
         (
             Departure(2.0, "push", 1, 112.5, 0.8, 0.3, 0.02),
             "disturbed 12.5 s into the window on ay: a 0.8 s push of "
-            "+0.3 ± 0.02 m/s², 15 times the noise",
+            "+0.30 ± 0.02 m/s², 15 times the noise",
         ),
         (
             Departure(2.0, "step", 3, 112.5, 0.8, -0.004, 0.0005),
             "disturbed 12.5 s into the window on gx: a lasting change of "
-            "-0.004 ± 0.0005 rad/s, 8 times the noise",
+            "-0.0040 ± 0.0005 rad/s, 8 times the noise",
+        ),
+        (
+            Departure(2.0, "push", 4, 112.5, 1.6, 0.2, 1.2e-4),
+            "disturbed 12.5 s into the window on gy: a 1.6 s turn at "
+            "+0.2000 ± 0.0001 rad/s, 1667 times the noise",
         ),
         (
             Departure(2.0, "shake", 2, 112.5, 0.4, 0.25, 0.05),
@@ -276,7 +281,7 @@ def said(departure: Departure) -> str:
         ),
         (
             Departure(2.0, "drift", 2, 100.0, 30.0, 0.4, 0.01),
-            "creeping on az: +0.4 ± 0.01 m/s² over the window",
+            "creeping on az: +0.40 ± 0.01 m/s² over the window",
         ),
         (
             Departure(2.0, "noise", 5, 100.0, 0.1, 0.3, 0.1),

@@ -95,12 +95,15 @@ class Dictionary(ColumnTable):
         """A copy whose permanent groups are bias and scale factor with wide priors.
 
         Like a simulation it has no random group and no unknown part of the Earth's
-        rate.
+        rate. Errors of measured attitudes keep their stated size. The priors are those
+        of a calibration: without any, a parameter that the positions do not determine
+        follows the noise to values that no device has.
         """
         out = copy(self)
         known = (g for g in self.always if g.in_state and g.cause != "earth")
-        free = float(priors.SIZES[-1])
-        out.always = [replace(g, fixed_size=free) for g in known]
+        out.always = [
+            replace(g, fixed_size=g.fixed_size or priors.FREE_SIZE) for g in known
+        ]
         return out
 
     def instability_sigma(self, instability: Sequence[int]) -> Array:

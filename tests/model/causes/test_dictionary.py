@@ -147,7 +147,7 @@ def test_of_few_windows_instability_is_within_them() -> None:
 def test_a_prediction_has_bias_and_scale_factor_alone() -> None:
     plain = made(ladder(free=(2,))).calibration_only()
     assert {g.cause for g in plain.always} == {"bias", "scale"}
-    assert {g.fixed_size for g in plain.always} == {float(priors.SIZES[-1])}
+    assert {g.fixed_size for g in plain.always} == {priors.FREE_SIZE}
 
 
 def test_columns_that_are_added_apart_are_not_in_the_other() -> None:

@@ -28,6 +28,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.file_names import storable_text
 from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.core.samples import Array
+from fieldcal.history.repeats import part_of_row, supersede
 from fieldcal.history.tables import PARAMETER, REDUCED_ROWS, SESSION
 
 LEVELS = ("model", "lot", "station", "operator")
@@ -127,7 +128,7 @@ def store_session(db: Connection, one: StoredSession) -> None:
 
     A folder is one session, also if its serial number was corrected. An error replaces
     no result: it is stored in addition. Of several folders with the same samples, the
-    last one stored counts (`_supersede`).
+    last one stored counts (`repeats`).
     """
     error = None if one.error is None else storable_text(one.error)
     one = replace(one, folder=storable_text(one.folder), error=error)
@@ -137,7 +138,8 @@ def store_session(db: Connection, one: StoredSession) -> None:
         if db.execute(update(SESSION).where(here).values(row)).rowcount:
             return
     number = _replaced_row(db, here, _row(one))
-    _supersede(db, number, one)
+    if one.part is not None and one.result is not None:
+        supersede(db, number, one.serial, one.part)
     rows = [
         {"session": number, "name": n, "value": v, "sigma": s, "unit": u}
         for n, (v, s, u) in one.parameters.items()
@@ -159,33 +161,6 @@ def _replaced_row(db: Connection, here: Any, row: Mapping[str, Any]) -> int:
     db.execute(delete(REDUCED_ROWS).where(REDUCED_ROWS.c.session == number))
     db.execute(update(SESSION).where(SESSION.c.id == number).values(**row))
     return number
-
-
-def _supersede(db: Connection, number: int, one: StoredSession) -> None:
-    """Let one row count of all that have a result of the same samples.
-
-    It is the new one, unless it does not name its device and another one does. Its
-    calibration is accepted if one of the others was.
-    """
-    if one.part is None or one.result is None:
-        return
-    same = and_(
-        SESSION.c.id != number,
-        SESSION.c.recording == one.part.digest,
-        SESSION.c.part_start < one.part.end,
-        SESSION.c.part_end > one.part.start,
-        SESSION.c.result.is_not(None),
-    )
-    others = db.execute(select(SESSION.c.serial, SESSION.c.accepted).where(same)).all()
-    lesser = not one.serial and any(other.serial for other in others)
-    here = update(SESSION).where(SESSION.c.id == number)
-    db.execute(here.values(superseded=lesser))
-    if lesser:
-        return
-    if any(other.accepted for other in others):
-        db.execute(here.values(accepted=True))
-    there = update(SESSION).where(same)
-    db.execute(there.values(accepted=False, superseded=True))
 
 
 def _row(one: StoredSession) -> dict[str, Any]:
@@ -348,13 +323,6 @@ def _session_of_row(
         reduced,
         part_of_row(row),
     )
-
-
-def part_of_row(row: Row[Any]) -> RecordedPart | None:
-    """Samples that a stored session uses; None if unknown."""
-    if row.recording is None:
-        return None
-    return RecordedPart(row.recording, row.part_start, row.part_end)
 
 
 def without_repeats(

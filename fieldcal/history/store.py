@@ -227,7 +227,7 @@ class History:
             )
 
     def _run(self, row: Any) -> HistoryRun:
-        from fieldcal.history.sessions import part_of_row
+        from fieldcal.history.repeats import part_of_row
 
         try:
             found = Calibration.from_json(load_json(row.result))

@@ -33,7 +33,9 @@ def test_what_cannot_be_stored_is_shown_by_its_number() -> None:
 
 @pytest.mark.parametrize("name", ["log", "messung α", "测量", "a b.csv"])
 def test_a_path_of_utf8_passes(tmp_path: Path, name: str) -> None:
-    refuse_undecodable_path(tmp_path / name)
+    path = tmp_path / name
+    refuse_undecodable_path(path)
+    assert storable_text(str(path)) == str(path)
 
 
 @pytest.mark.parametrize("inner", ["", "march", "march/log.csv"])

@@ -91,3 +91,4 @@ def test_why_something_is_refused_is_said_as_a_sentence(address: str) -> None:
         )
         screen.value(SEND % "t,ax")
         screen.until(f"{said} === 'too many'")
+        assert screen.text("said") == "too many"

@@ -27,12 +27,19 @@ def select_positions(
     Raises
     ------
     PlanError
-        If no best positions exist, or a file has positions without angles.
+        If no best positions exist, a file has positions without angles, or an option
+        would be ignored.
 
     """
     from fieldcal.core.positions import POSITION_SETS
     from fieldcal.planning.planner import best_positions
 
+    if args.positions is not None and (args.set or args.of):
+        named = "--set" if args.set else "--of"
+        raise PlanError(
+            f"--positions is how many are chosen, and {named} names them: leave one of"
+            " the two out"
+        )
     if args.of is None:
         many = DEFAULT_COUNT if args.positions is None else args.positions
         return (

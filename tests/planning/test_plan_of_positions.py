@@ -105,6 +105,9 @@ def test_what_cannot_be_planned_is_refused(
         assert main(["plan", *words]) == 2
     assert main(["plan", "--sways", "0"]) == 2
     assert "above 0" in capsys.readouterr().err
+    for names in (["--of", str(file)], ["--set", "two"]):
+        assert main(["plan", *names, "--positions", "7"]) == 2
+        assert f"{names[0]} names them" in capsys.readouterr().err
 
 
 def test_slow_swaying_and_little_noise_need_longer_windows() -> None:

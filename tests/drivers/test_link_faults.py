@@ -30,8 +30,10 @@ every_link = pytest.mark.parametrize(
     "link",
     [
         "serial",
-        "can",
-        *(pytest.param(m, marks=pytest.mark.thorough) for m in ("mavlink", "text")),
+        *(
+            pytest.param(m, marks=pytest.mark.thorough)
+            for m in ("can", "mavlink", "text")
+        ),
     ],
 )
 

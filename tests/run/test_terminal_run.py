@@ -23,19 +23,14 @@ SPEED = 16.0
 DRAWN = re.escape("\x1b[H")
 """What each drawing of a screen begins with."""
 
-SIM = ["--serial", "witmotion", "--seed", "4", "--rate", "50"]
+SIM = ["--serial", "witmotion", "--speed", str(SPEED), "--seed", "4", "--rate", "50"]
 SIM += ["--base-tilt=1,-0.5", "--latitude=50.45", "--height=170"]
 
 
 @pytest.fixture
-def speed() -> float:
-    return SPEED
-
-
-@pytest.fixture
-def device(tmp_path: Path, speed: float) -> Iterator[VirtualMover]:
+def device(tmp_path: Path) -> Iterator[VirtualMover]:
     link = tmp_path / "port"
-    sim = [*SIM, *steady(tmp_path), "--port-link", str(link), "--speed", str(speed)]
+    sim = [*SIM, *steady(tmp_path), "--port-link", str(link)]
     with VirtualMover(sim, once=False) as made:
         made.port = str(link)
         yield made
@@ -199,11 +194,10 @@ ERRORS: list[Callable[[Console], None]] = [
 
 
 @pytest.mark.parametrize(
-    ("errors", "spoilt", "bells", "speed"),
+    ("errors", "spoilt", "bells"),
     [
-        # a wrong place stays on the screen until the device is turned
-        (WRONG_PLACES, 0, 9, 40.0),
-        pytest.param(ERRORS, 2, 12, SPEED, marks=pytest.mark.thorough),
+        (WRONG_PLACES, 0, 9),
+        pytest.param(ERRORS, 2, 12, marks=pytest.mark.thorough),
     ],
     ids=["places", "all"],
 )

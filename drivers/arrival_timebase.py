@@ -148,6 +148,9 @@ class ArrivalTimebase:
 
 def _split_by_arrival(steps: Array, t_host: Array) -> Iterator[tuple[Array, float]]:
     """Split into batches of equal arrival time."""
-    cuts = np.flatnonzero(np.diff(t_host)) + 1
+    cuts = np.flatnonzero(t_host[1:] - t_host[:-1]) + 1
+    if not len(cuts):
+        yield steps, float(t_host[-1])
+        return
     for batch, host in zip(np.split(steps, cuts), np.split(t_host, cuts), strict=True):
         yield batch, float(host[-1])

@@ -104,11 +104,17 @@ def allan_deviation(block: Block) -> AllanDeviation:
     longest = len(block) / rate / AVERAGES
     tau = np.geomspace(0.1, longest, round(3 * np.log2(longest / 0.1)))
     m = np.unique(np.maximum(1, np.round(tau * rate))).astype(int)
+    freedom = [
+        tools.edf_greenhall(0, 2, int(number), len(six), overlapping=True)
+        for number in m
+    ]
     table = np.full((3, len(m), 6), np.nan)
     for channel in range(6):
         x = six[:, channel]
         if np.isnan(x).mean() < 0.5:
-            table[:, :, channel] = _channel_deviation(tools, _interpolated(x), rate, m)
+            table[:, :, channel] = _channel_deviation(
+                tools, _interpolated(x), rate, m, freedom
+            )
     pieces = [
         six[first : first + STEP_SAMPLES] for first in range(0, len(six), STEP_SAMPLES)
     ]
@@ -118,15 +124,19 @@ def allan_deviation(block: Block) -> AllanDeviation:
     return AllanDeviation(m / rate, table[0], table[1], table[2], rounding)
 
 
-def _channel_deviation(tools: Any, x: Array, rate: float, m: Array) -> Array:
-    """Deviation with its interval, (3, k), at m samples (k,)."""
+def _channel_deviation(
+    tools: Any, x: Array, rate: float, m: Array, freedom: list[float]
+) -> Array:
+    """Deviation with its interval, (3, k), at m samples (k,).
+
+    `freedom` are the degrees of freedom (k,), which all channels have in common.
+    """
     _, deviation, _, n = tools.oadev(x - x.mean(), rate, "freq", m / rate)
     if len(deviation) != len(m):
         raise AssertionError("allantools leaves out no tau with four means or more")
     low, high = np.empty_like(deviation), np.empty_like(deviation)
-    for i, (value, number) in enumerate(zip(deviation, m, strict=True)):
-        freedom = tools.edf_greenhall(0, 2, int(number), len(x), overlapping=True)
-        low[i], high[i] = tools.confidence_interval(value, edf=freedom)
+    for i, (value, known) in enumerate(zip(deviation, freedom, strict=True)):
+        low[i], high[i] = tools.confidence_interval(value, edf=known)
     return np.array([deviation, low, high])
 
 

@@ -65,7 +65,7 @@ def _robust_line(values: Array, step: Array) -> Array:
         return np.broadcast_to(_median(values, step), values.shape)
     size = m // _PIECES
     cut = values[: size * _PIECES].reshape(_PIECES, size, -1)
-    medians = np.array([_median(piece, step) for piece in cut])
+    medians = _median(cut, step)
     i, j = np.triu_indices(_PIECES, 1)
     slopes = (medians[j] - medians[i]) / ((j - i) * size)[:, None]
     tilt = np.arange(m)[:, None] * np.median(slopes, axis=0)
@@ -74,13 +74,13 @@ def _robust_line(values: Array, step: Array) -> Array:
 
 
 def _median(values: Array, step: Array) -> Array:
-    """Median (c,) of rounded values (m, c), interpolated within its step.
+    """Median (..., c) of rounded values (..., m, c), interpolated within its step.
 
     The plain median is one of few values, and up to half a step off.
     """
-    middle: Array = np.median(values, axis=0)
-    half = step / 2
-    inside = (np.abs(values - middle) <= half).sum(axis=0)
-    below = (values < middle - half).sum(axis=0)
-    share = (len(values) / 2 - below) / np.maximum(inside, 1)
+    middle: Array = np.median(values, axis=-2)
+    centre, half = middle[..., None, :], step / 2
+    inside = (np.abs(values - centre) <= half).sum(axis=-2)
+    below = (values < centre - half).sum(axis=-2)
+    share = (values.shape[-2] / 2 - below) / np.maximum(inside, 1)
     return middle + np.where(inside > 0, step * (share - 0.5), 0.0)

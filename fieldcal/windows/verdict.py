@@ -168,8 +168,9 @@ def judge_window(
     tests = _disturbance_statistics(
         cells, means, lines, noise, _least_spreads(cells, least)
     )
+    period = cells.period
     departures = [
-        *(_worst_departure(cells, test, allowed) for test in tests),
+        *(_worst_departure(cells.times, period, test, allowed) for test in tests),
         *_stuck_runs(cells),
         _drift_departure(cells, lines, noise, limits),
         _noise_departure(cells, noise.spread[0], limits),
@@ -255,17 +256,20 @@ def _stuck_runs(cells: CellTable) -> list[Departure]:
 
 
 def _worst_departure(
-    cells: CellTable, test: DisturbanceStatistic, allowed: float
+    times: Array, period: float, test: DisturbanceStatistic, allowed: float
 ) -> Departure:
-    """Largest departure of one statistic, with the `allowed` ratio z."""
+    """Largest departure of one statistic, with the `allowed` ratio z.
+
+    `times` and `period` are those of the cells, s.
+    """
     first, channel = divmod(int(np.argmax(test.z)), test.z.shape[1])
     cell = first + test.cells if test.kind == "step" else first
     return Departure(
         float(test.z[first, channel] / allowed),
         test.kind,
         channel,
-        float(cells.times[cell]),
-        cells.period * test.cells,
+        float(times[cell]),
+        period * test.cells,
         float(test.size[first, channel]),
         float(test.noise[channel]),
     )

@@ -15,7 +15,7 @@ def device(acc: np.ndarray, gyr: np.ndarray) -> Device:
     return Device(none[:3], none[:3], acc, gyr, (0.0, 0.0), none, 0.0, (0.0, 0.0))
 
 
-@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("seed", [pytest.param(3, marks=pytest.mark.thorough), 8])
 def test_a_log_is_of_a_device_that_rests_and_turns(seed: int) -> None:
     one = log(88_000_000 + seed)
     t, six = one.rows[:, 0], one.rows[:, 1:7]

@@ -53,6 +53,7 @@ def test_a_run_leaves_its_report(recalibrated: Recalibrated) -> None:
     )
 
 
+@pytest.mark.thorough
 def test_solving_the_recorded_session_gives_the_same_numbers(
     recalibrated: Recalibrated, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,7 +14,7 @@ def heard(ppm: float, seed: int, seconds: float = 300.0) -> ClockComparison:
     delay = 0.002 + rng.exponential(0.003, len(t))
     delay += 0.2 * (rng.random(len(t)) < 0.01)
     skew = ClockComparison(LinkHealth())
-    for part in np.array_split(np.arange(len(t)), 70):
+    for part in np.array_split(np.arange(len(t)), 25):
         skew.add(t[part], (host + delay)[part])
     return skew
 

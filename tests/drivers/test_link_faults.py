@@ -30,8 +30,10 @@ every_link = pytest.mark.parametrize(
     "link",
     [
         "serial",
-        "can",
-        *(pytest.param(m, marks=pytest.mark.thorough) for m in ("mavlink", "text")),
+        *(
+            pytest.param(m, marks=pytest.mark.thorough)
+            for m in ("can", "mavlink", "text")
+        ),
     ],
 )
 
@@ -244,7 +246,7 @@ def ended(folder: Path, link: str, fault: str) -> tuple[Path, int, str]:
     return folder / "s", code, said
 
 
-LONG = {("mavlink", "silence_s"), ("mavlink", "hangup_s")}
+LONG = {("mavlink", "silence_s"), ("mavlink", "hangup_s"), ("can", "hangup_s")}
 """On the way of another fault of the same link, or of this fault of another link."""
 
 

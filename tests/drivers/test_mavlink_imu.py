@@ -102,7 +102,11 @@ def test_same_truth_over_udp_tcp_and_a_serial_port(place: str) -> None:
 
 @pytest.mark.parametrize(
     ("program", "message", "warns"),
-    [("px4", "HIGHRES_IMU", 1), ("px4", "SCALED_IMU", 0), ("ardupilot", "RAW_IMU", 0)],
+    [
+        ("px4", "HIGHRES_IMU", 1),
+        ("px4", "SCALED_IMU", 0),
+        pytest.param("ardupilot", "RAW_IMU", 0, marks=pytest.mark.thorough),
+    ],
 )
 def test_biases_that_a_filter_takes_out_meanwhile_are_told(
     program: str, message: str, warns: int

@@ -145,7 +145,9 @@ def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
         open_driver(f"mavlink:{tmp_path / 'odd.tlog'}")
 
 
-@pytest.mark.parametrize("message", ["RAW_IMU", "HIGHRES_IMU"])
+@pytest.mark.parametrize(
+    "message", ["RAW_IMU", pytest.param("HIGHRES_IMU", marks=pytest.mark.thorough)]
+)
 def test_cuts_and_garbage_change_nothing(log: bytes, message: str) -> None:
     data = log[:6_000]
     whole = decoded(data, f"message={message}")

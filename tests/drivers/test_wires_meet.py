@@ -38,7 +38,9 @@ def test_the_virtual_device_writes_what_the_drivers_read() -> None:
 
 
 @pytest.mark.parametrize("name", wire.formats())
-@pytest.mark.parametrize("cut", [10_000_000, 4096, 61])
+@pytest.mark.parametrize(
+    "cut", [10_000_000, 4096, pytest.param(61, marks=pytest.mark.thorough)]
+)
 def test_what_was_measured_arrives_within_the_rounding(name: str, cut: int) -> None:
     rng = np.random.default_rng(11)
     n = 800

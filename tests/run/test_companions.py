@@ -46,7 +46,7 @@ def led(
     killed_at: int | None = None,
 ) -> tuple[int, Any, str]:
     """A run of two positions in which somebody turns all devices when told to."""
-    run = [*RUN, "--headless", "--json", *options]
+    run = [*RUN, "--headless", "--json", "--no-report", *options]
     if "--resume" not in options:
         run += ["two_position", "--level=0.001", "--angles=0.001"]
         run += ["--squareness=1e-5"]
@@ -72,10 +72,10 @@ def led(
 
 
 def started(
-    stack: ExitStack, folder: Path, *last: str, once: bool = True
+    stack: ExitStack, folder: Path, *last: str, once: bool = True, number: int = 3
 ) -> tuple[list[VirtualMover], list[str]]:
     devices, urls = [], []
-    for link, bias in zip(LINKS, BIASES, strict=True):
+    for link, bias in zip(LINKS[:number], BIASES[:number], strict=True):
         options = [*link.split(), *steady(folder), "--speed=20", f"--acc-bias={bias}"]
         options += ["--latitude=50.45", "--height=0"]
         options += last if link == LINKS[-1] else ()
@@ -104,6 +104,22 @@ def test_three_devices_on_three_links_have_a_session_and_a_result_each(
     (kept,) = History(tmp_path / "h").runs("B1")
     assert kept.session == str(tmp_path / "s" / "device-2")
     assert kept.calibration.to_json() == result["further"]["device-2"]
+
+
+def test_a_run_that_is_killed_goes_on_with_what_is_left(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, tmp_path, once=False, number=1)
+        session = tmp_path / "s"
+        led(devices, urls, "-o", str(session), killed_at=1)
+        before = list(read_marks(session / "marks.jsonl"))
+        assert not (session / "result.json").exists()
+        code, result, said = led(devices, [], "--resume", str(session))
+        truths = [device.truth for device in devices]
+    assert code == 0, (result["decision"]["reasons"], said)
+    check(session, truths, urls, result, go=(True,))
+    taken = [m for m in before if m["event"] == "window"]
+    after = [m for m in read_marks(session / "marks.jsonl") if m["event"] == "window"]
+    assert [m["position"] for m in after] == [0, 1] and after[:1] == taken
 
 
 @pytest.mark.thorough
@@ -135,7 +151,8 @@ def check(
 ) -> None:
     """Whether every device has its session, and a result that is right."""
     sessions = [root, *sorted(root.glob("device-*"))]
-    assert [path.name for path in sessions] == ["s", "device-2", "device-3"]
+    names = ["s", "device-2", "device-3"]
+    assert [path.name for path in sessions] == names[: len(truths)]
     for folder, truth, url, good in zip(sessions, truths, urls, go, strict=True):
         written = json.loads((folder / "result.json").read_text())
         for group in ("acc_bias", "acc_scale", "gyr_bias"):
@@ -157,9 +174,7 @@ def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) ->
         devices, urls = started(stack, tmp_path)
         urls[1] += "&reconnect=0"
         devices[1].ask(fault={"silence_s": 1e6})
-        code, result, said = led(
-            devices, urls, "--no-report", "-o", str(tmp_path / "s")
-        )
+        code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
     assert code == 3
     assert said.startswith("fieldcal run: device-2: ")
     assert said.endswith("; the other devices have their results")
@@ -175,9 +190,9 @@ def test_a_first_device_that_says_nothing_leaves_no_session_of_the_others(
     call = ["run", "two_position", "--headless", "--level=0.01", "--angles=0.01"]
     call += ["-o", str(tmp_path / "s")]
     with ExitStack() as stack:
-        devices, urls = started(stack, tmp_path)
+        devices, urls = started(stack, tmp_path, number=2)
         devices[0].ask(fault={"silence_s": 1e6})
-        for url in urls[:2]:
+        for url in urls:
             call += ["--device", url]
         assert main([*call, "--latitude=50.45"]) == 3
     assert not (tmp_path / "s").exists()

@@ -12,7 +12,7 @@ from fieldcal.core.errors import (
     CalibrationFailed,
     WrongPosition,
 )
-from fieldcal.core.positions import TWO_POSITIONS
+from fieldcal.core.positions import TWO_POSITIONS, Position
 from fieldcal.diagnosis import diagnose
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.planning.steps import hold
@@ -58,10 +58,10 @@ def test_a_position_never_reached_is_given_up(bench: Bench) -> None:
 
 
 class Fast(InProcess):
-    """A device that runs at ten times the host's clock."""
+    """A device that runs at seven times the host's clock."""
 
     def host_time(self) -> float:
-        return self.device.time / 10
+        return self.device.time / 7
 
 
 def test_a_fast_device_gives_whoever_turns_it_some_time_by_the_clock(
@@ -161,6 +161,32 @@ def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
     before = Session.open(bench.folder).block.between(2.0, 9.0)
     off = np.abs(found.mean - np.nanmean(before.six, axis=0)) / found.sigma
     assert off[:3].max() < 6.0, "what leant is no part of the mean"
+
+
+def test_who_turns_before_a_position_is_done_is_told_so(bench: Bench) -> None:
+    class Early(Turner):
+        """Turns on amid the second window, and back when told."""
+
+        early = False
+
+        def show(self, view: OperatorView) -> None:
+            super().show(view)
+            second = [v.phase for v in self.views].count("taken") == 1
+            averaging = view.phase == "averaging" and view.elapsed > 5.0
+            if second and averaging and not self.early:
+                self.early = True
+                self.driver.place(Position.deg(-45.0, 5.0))
+
+        def tell(self, text: str) -> None:
+            super().tell(text)
+            if "too early" in text:
+                self.driver.place(TWO_POSITIONS[1])
+
+    turner = Early(bench.turner.driver)
+    engine = Engine(turner.driver, turner, ABOUT, bench.recorder, give_up=60.0)
+    averages = engine.run(hold_all(TWO_POSITIONS, 10.0))
+    assert any("turned too early, position 2 is not done" in t for t in turner.told)
+    assert averages[1].mean[0] < 0, "the window must be from +45 degrees"
 
 
 def test_a_gust_costs_what_it_spoils(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import parse
 
+import numpy as np
 import pytest
 import tomlkit
 from hypothesis import given
@@ -185,7 +186,7 @@ def run(folder: Path, device: VirtualMover, fails: str, junit: Path, *more: str)
     path.write_text(tomlkit.dumps(tables))
     session = folder / "s"
     return main(
-        ["run", str(path), "--headless", "--json", "-o", str(session)]
+        ["run", str(path), "--headless", "--json", "--no-report", "-o", str(session)]
         + ["--junit", str(junit), *more]
     )
 
@@ -209,6 +210,13 @@ def test_a_night_without_an_operator(
     assert suite.get("failures") == suite.get("errors") == "0"
     names = [case.get("name", "") for case in suite.iter("testcase")]
     assert names[0] == "1: α = 0°, β = 0°" and "gyr_bias uncertainty" in names
+    assert main(["solve", str(tmp_path / "s"), "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)["parameters"]
+    assert again.keys() == result["parameters"].keys()
+    for group, found in result["parameters"].items():
+        for key, close in (("value", 1e-9), ("sigma", 1e-6)):
+            one, two = (np.array(f[key], float) for f in (again[group], found))
+            np.testing.assert_allclose(one, two, rtol=close, atol=1e-12)
 
 
 def test_a_turntable_that_jams_ends_the_run_with_3(

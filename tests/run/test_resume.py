@@ -256,6 +256,7 @@ def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
     assert description.read_description(tmp_path / "s" / "session.toml").positions
 
 
+@pytest.mark.thorough
 def test_a_run_that_is_killed_goes_on_and_ends_with_right_numbers(
     tmp_path: Path,
 ) -> None:

@@ -51,7 +51,9 @@ def run(step: int, profile: Profile = RICH, seed: int = 5) -> Block:
     return concat(blocks)
 
 
-@pytest.mark.parametrize("step", [pytest.param(1, marks=pytest.mark.thorough), 7, 64])
+@pytest.mark.parametrize(
+    "step", [37, *(pytest.param(n, marks=pytest.mark.thorough) for n in (1, 7, 64))]
+)
 def test_samples_do_not_depend_on_the_size_of_the_blocks(step: int) -> None:
     whole, pieces = run(2000), run(step)
     for name in ("t", "acc", "gyr", "temperature", "seq", "t_host"):

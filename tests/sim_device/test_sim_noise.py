@@ -74,7 +74,7 @@ def test_flicker_keeps_its_allan_deviation_over_two_decades() -> None:
         ZERO, ZERO, acc_instability=ZERO, gyr_instability=ZERO,
         acc_flicker=ONE, gyr_flicker=ONE,
     )  # fmt: skip
-    x = RandomErrors(figures, RATE, 8, np.ones(6)).slow(400_000)
+    x = RandomErrors(figures, RATE, 8, np.ones(6)).slow(200_000)
     spans = np.array([8.0, 32.0, 128.0, 512.0])
     found = np.array([allan(x, span) for span in spans])
     np.testing.assert_allclose(found, 1.0, rtol=0.12)

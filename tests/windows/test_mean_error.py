@@ -41,10 +41,10 @@ def pulls(source: Callable[..., Array], channels: int = 900) -> Array:
     ("source", "least", "most"),
     [
         (white, 0.90, 1.04),
-        (low_passed(20), 0.90, 1.04),
+        pytest.param(low_passed(20), 0.90, 1.04, marks=pytest.mark.thorough),
         (low_passed(5), 0.90, 1.04),
-        (markov(0.5), 0.90, 1.04),
-        (markov(0.95), 0.70, 1.0),
+        pytest.param(markov(0.5), 0.90, 1.04, marks=pytest.mark.thorough),
+        pytest.param(markov(0.95), 0.70, 1.0, marks=pytest.mark.thorough),
         (flicker(1.0), 0.80, 1.1),
     ],
 )

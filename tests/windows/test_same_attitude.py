@@ -30,8 +30,9 @@ def recorded(
     away: float = 0.0,
     swings: float = 2e-3,
     noise: float = 0.01,
+    seconds: float = 120.0,
 ) -> Block:
-    """Two minutes on a table that is knocked, with gyroscopes that give mean rates.
+    """Some time on a table that is knocked, with gyroscopes that give mean rates.
 
     Parameters
     ----------
@@ -41,10 +42,11 @@ def recorded(
     away : angle by which it is lifted off for two seconds at the first, rad
     swings : angle that a knock lets it swing by, rad
     noise : of the accelerometers, m/s^2
+    seconds : how long it is recorded
 
     """
     rng = np.random.default_rng(seed)
-    edges = np.arange(round(120 * RATE) + 1) / RATE
+    edges = np.arange(round(seconds * RATE) + 1) / RATE
     t = edges[1:]
     axis, up = rng.normal(size=3), np.array([1.0, 5.0, 8.0]) + rng.normal(size=3)
     axis /= np.linalg.norm(axis)
@@ -92,10 +94,14 @@ def test_a_knock_is_left_out_of_a_rest() -> None:
 
 @pytest.mark.statistical
 @pytest.mark.parametrize(
+    ("seeds", "other"), [(5, 0), pytest.param(12, 1, marks=pytest.mark.thorough)]
+)
+@pytest.mark.parametrize(
     ("facts", "least", "most"),
     [
         ({}, 1, 1),
-        ({"tilts": 0.1}, 2, 2),  # it lies otherwise
+        # it lies otherwise
+        pytest.param({"tilts": 0.1}, 2, 2, marks=pytest.mark.thorough),
         ({"tilts": 0.03}, 2, 2),
         ({"jump": 0.03, "swings": 1e-4}, 1, 1),  # the gyroscopes saw no turn
         ({"drift": 2e-4}, 1, 1),  # a bias that goes on as it went
@@ -103,15 +109,16 @@ def test_a_knock_is_left_out_of_a_rest() -> None:
     ],
 )
 def test_it_lies_as_before_where_it_does(
-    facts: dict[str, float], least: int, most: int
+    facts: dict[str, float], least: int, most: int, seeds: int, other: int
 ) -> None:
-    found = [len(rests(recorded(seed, **facts))) for seed in range(12)]
+    """Of five recordings all, and of twelve all but one."""
+    found = [len(rests(recorded(seed, **facts))) for seed in range(seeds)]
     inside = [least <= n <= most for n in found]
-    assert sum(inside) >= len(inside) - 1, found
+    assert sum(inside) >= len(inside) - other, found
 
 
 def test_a_jump_is_no_jump_of_the_bias_without_gyroscopes() -> None:
-    for seed in range(4):
+    for seed in range(2):
         block = recorded(seed, jump=0.03)
         alone = Block.of(block.t, block.acc)
         assert len(rests(alone)) == 2
@@ -140,7 +147,7 @@ def test_of_a_bias_that_jumps_untouched_nothing_is_left_out(touched: bool) -> No
 def test_positions_without_the_turns_between_them_are_not_one() -> None:
     """Rows that are taken at rest only: the gyroscopes show no turn."""
     t = np.arange(4000) / RATE
-    for seed in range(12):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         force = np.array([[0, 0, G], [0, G, 0], [G, 0, 0], [0, 0, -G]])
         acc = force[np.arange(4000) // 1000] + 0.01 * rng.standard_normal((4000, 3))
@@ -164,7 +171,7 @@ def test_what_is_said_to_be_sure_is() -> None:
         turned = (
             0.0 if as_it_lay else float(np.rad2deg(TYPICAL_ROTATION) * rng.rayleigh())
         )
-        block = recorded(seed, turned, noise=0.1)
+        block = recorded(seed, turned, noise=0.1, seconds=52.0)
         gap = (39.5, 42.0)
         sides = [block.between(30.0, gap[0]), block.between(gap[1], 51.0)]
         before, after = cells_of(sides)

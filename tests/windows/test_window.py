@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fieldcal.core.errors import InputError, Moved
-from fieldcal.core.samples import CHANNELS, Array, Block, Grain, concat
+from fieldcal.core.samples import CHANNELS, Array, Block, Grain
 from fieldcal.windows import Average, StillnessLimits, Window, average
 from fieldcal.windows.cells import CellAccumulator
 from fieldcal.windows.grain import rounding_variance
@@ -31,7 +31,7 @@ def rejection(block: Block) -> Moved | None:
 @pytest.mark.statistical
 def test_white_noise_averages_with_the_root_of_the_number() -> None:
     sigmas = [average(block_of(white(np.random.default_rng(s), 6000))).sigma
-              for s in range(20)]  # fmt: skip
+              for s in range(10)]  # fmt: skip
     ratio = np.median(sigmas / (UNIT / np.sqrt(6000)))
     assert 0.97 < ratio < 1.06
 
@@ -61,17 +61,24 @@ def test_channels_that_wander_together_say_so() -> None:
 
 
 @pytest.mark.statistical
-def test_noise_alone_is_not_rejected() -> None:
+@pytest.mark.parametrize(
+    ("seeds", "most"), [(8, 0), pytest.param(30, 1, marks=pytest.mark.thorough)]
+)
+def test_noise_alone_is_not_rejected(seeds: int, most: int) -> None:
+    """Of 32 windows none, and of 120 no more than one."""
     rejected = 0
-    for seed in range(30):
+    for seed in range(seeds):
         rng = np.random.default_rng(seed)
         for source in (white, low_passed(20), markov(0.5), flicker(0.03)):
             rejected += rejection(block_of(source(rng, 3000))) is not None
-    assert rejected <= 1, "of 120 windows"
+    assert rejected <= most
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize(("rate", "seconds"), [(50.0, 30.0), (100.0, 60.0)])
+@pytest.mark.parametrize(
+    ("rate", "seconds"),
+    [(50.0, 30.0), pytest.param(100.0, 60.0, marks=pytest.mark.thorough)],
+)
 def test_five_sigma_for_half_a_second_are_caught(rate: float, seconds: float) -> None:
     n, long = int(rate * seconds), int(rate / 2)
     for seed in range(60):
@@ -140,7 +147,7 @@ def same(a: Average, b: Average) -> bool:
 
 
 @pytest.mark.statistical
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(
     cuts=st.lists(st.integers(0, 1500), max_size=12),
     rate=st.sampled_from([37.0, 100.0, 204.8]),
@@ -187,8 +194,8 @@ def test_lost_samples_are_no_disturbance() -> None:
         block = block_of(white(rng, 3000))
         kept = np.sort(rng.choice(3000, 2200, replace=False))
         kept = kept[(kept < 700) | (kept > 800)]
-        rows = [block[int(k) : int(k) + 1] for k in kept]
-        rejected += rejection(concat(rows)) is not None
+        some = Block.of(block.t[kept], block.acc[kept], block.gyr[kept])
+        rejected += rejection(some) is not None
     assert rejected == 0
 
 
@@ -199,7 +206,7 @@ def test_lost_samples_are_no_disturbance() -> None:
 )
 def test_rounding_that_the_noise_does_not_hide_is_in_the_error(noise: float) -> None:
     errors, sigmas = [], []
-    for seed in range(40):
+    for seed in range(20):
         rng = np.random.default_rng(seed)
         truth = rng.uniform(0, 1, 6)
         values = np.round(truth + noise * rng.standard_normal((3000, 6)))

@@ -250,7 +250,7 @@ def test_an_address_that_is_not_here_or_taken_is_said() -> None:
 
 def test_a_run_is_watched_to_its_end(tmp_path: Path) -> None:
     """A headless run on a virtual device: the page follows and is told GO."""
-    virtual = [f"--virtual={' '.join(steady(tmp_path))}", "--speed=60"]
+    virtual = [f"--virtual={' '.join(steady(tmp_path))}", "--speed=20", "--seconds=12"]
     command = [*TWO_POSITION, *virtual, "--page", LOCAL, "-o", str(tmp_path / "s")]
     command += ["--history", str(tmp_path / "h.db")]
     words: list[str] = []

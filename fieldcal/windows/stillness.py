@@ -92,12 +92,12 @@ class Stillness:
         complete = self._cells.take_complete()
         for time, mean, short, finest in zip(
             complete.times,
-            np.nan_to_num(complete.means),
-            np.nan_to_num(complete.short_lag_variance),
+            complete.means,
+            complete.short_lag_variance,
             complete.smallest_changes,
             strict=True,
         ):
-            self._recent.append((mean, short))
+            self._recent.append((np.nan_to_num(mean), np.nan_to_num(short)))
             self._finest = np.minimum(self._finest, finest)
             if len(self._recent) == CELLS_TOGETHER:
                 self._judge(float(time))
@@ -105,7 +105,7 @@ class Stillness:
     def _judge(self, time: float) -> None:
         """Evaluate the last cells; `time` is the start of the last one, s."""
         y, short = (np.array(rows) for rows in zip(*self._recent, strict=True))
-        self._noises.append(np.sqrt(((y[1:] - y[:-1]) ** 2).mean(axis=0) / 2))  # (1)
+        self._noises.append(np.sqrt((np.diff(y, axis=0) ** 2).mean(axis=0) / 2))  # (1)
         noise = self._noise(np.sqrt(short.mean(axis=0)))
         if self._sways:
             self.meter = self._swinging(y)
@@ -122,7 +122,7 @@ class Stillness:
 
     def _noise(self, sampled: Array) -> Array:
         """Noise of a cell mean, (6,); `sampled` is the short-lag noise, (6,)."""
-        smallest = _SMALLEST * _lower_decile(np.array(self._noises))
+        smallest = _SMALLEST * np.quantile(self._noises, 0.1, axis=0)
         noise: Array = np.maximum(
             smallest, visible_steps(resolution(self._finest), sampled)
         )
@@ -150,26 +150,9 @@ class Stillness:
         if self._rest is None:
             return 0.0
         off = np.abs(rates.mean(axis=0) - self._rest) / (RATE + SPREAD_RATIO * noise)
-        changes = np.abs(rates[1:] - rates[:-1])
-        even = changes.max(axis=0) <= 3 * SLOPE_RATIO * noise
+        even = np.abs(np.diff(rates, axis=0)).max(axis=0) <= 3 * SLOPE_RATIO * noise
         self._even = self._even + 1 if off.max() > 1 and even.all() else 0
         return float(off.max()) if self._even < BIAS_CELLS else 0.0
-
-
-def _lower_decile(values: Array) -> Array:
-    """Lower decile (c,) of `values` (m, c), none of them missing.
-
-    The sums are those of `np.quantile`, which for so few values takes several times as
-    long.
-    """
-    place = 0.1 * (len(values) - 1)
-    first = int(place)
-    next_one = min(first + 1, len(values) - 1)
-    ordered = np.partition(values, (first, next_one), axis=0)
-    low, high, share = ordered[first], ordered[next_one], place - first
-    change = high - low
-    decile: Array = low + change * share
-    return decile if share < 0.5 else high - change * (1 - share)
 
 
 def _zero_as_inf(allowed: Array) -> Array:

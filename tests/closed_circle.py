@@ -23,10 +23,10 @@ IN_EVERY_RUN = (
     "gravity_error",  # of the motion
     "angle_setting",  # by chance
     "gyro_cross_coupling",  # of a sensor, seen in positions and turns
-    "temperature_scale",  # over the temperature
-    "joint_creep",  # after each turn
+    "settling",  # after each turn
 )
-"""Of what changes with time, `test_diagnosis_one_axis` conceals a step of a bias."""
+"""Of what changes with time, `test_diagnosis_one_axis` conceals a step of a bias, and
+`test_diagnosis_page` one that follows the temperature."""
 
 
 def one_in(number: int, cases: Sequence[tuple[Any, ...]]) -> list[Any]:

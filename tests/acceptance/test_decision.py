@@ -29,7 +29,7 @@ from fieldcal.core.positions import (
     Position,
 )
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.solution import PreparedSession
 from fieldcal.history.family import next_run_distribution
 from fieldcal.session import description
 from fieldcal.session.folder import Session
@@ -480,7 +480,8 @@ def five_held_of_six(
     block = recorded(CALM, held)
     write_session(folder, block, held[:5], site=SITE, verification=LAST)
     session = Session.open(folder)
-    return folder, solve_session(session, usable_windows(session))
+    windows = usable_windows(session)
+    return folder, solve(PreparedSession(session, windows).observations)
 
 
 @pytest.mark.parametrize(

@@ -87,6 +87,7 @@ def value(found: Match, name: str, parameter: str) -> tuple[float, float]:
     return float(off.value), off.sigma
 
 
+@pytest.mark.thorough
 def test_a_simulator_that_is_like_the_device_agrees(real: DiagnosedRecording) -> None:
     found = against(real, DEVICE)
     assert found.verdict == "consistent" and not found.differences

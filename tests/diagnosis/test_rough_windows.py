@@ -12,7 +12,7 @@ from session_folders import places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.diagnosis.prepare import prepare_recording
+from fieldcal.diagnosis.signal.chain import check_chain
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession
 from fieldcal.session.folder import Session
@@ -45,12 +45,10 @@ def test_a_turn_inside_the_windows_tells_no_unit(
     for positions, wrong in ((ROUGHLY, False), (HELD, unit != 1.0)):
         folder = read_as(unit, block, tmp_path / str(wrong), positions)
         session = Session.open(folder)
-        diagnosed = prepare_recording(session.block, session.about)
-        assert ("mounting" in diagnosed.checked.ids) == wrong
+        assert ("mounting" in check_chain(session.block, session.about).ids) == wrong
         # solve keeps the calm part of each window, beside which the turn is whole
-        solved = PreparedSession(session, usable_windows(session)).reduced_recording
-        assert solved is not None
-        assert ("mounting" in solved.checked.ids) == (unit != 1.0)
+        calm = PreparedSession(session, usable_windows(session)).about
+        assert ("mounting" in check_chain(session.block, calm).ids) == (unit != 1.0)
 
 
 def test_the_unit_that_solve_finds_beside_the_calm_parts_is_said(

@@ -233,7 +233,7 @@ def test_a_line_is_told_of_the_triad_that_there_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str],
     missing: str, hum: str, unit: str,
 ) -> None:  # fmt: skip
-    positions = places()[:4]
+    positions = places(seconds=10.0)[:3]
     block = recorded(replace(DEVICE, effects=(parse(hum),)), positions, 1)
     none = np.full_like(block.acc, np.nan)
     write_session(tmp_path, replace(block, **{missing: none}), positions)

@@ -84,5 +84,5 @@ def test_positions_are_exchanged_if_each_was_held_where_the_other_is(
     off_there = [off_in((2,)), off_in((5,))]
     told = unknown_mismatches(explanation, standing, off_there)
     for one in told:
-        assert [tuple(one.exchanged)] == (exchanged or [()])
+        assert one.exchanged == (exchanged[0] if exchanged else ())
         assert not (exchanged and one.angle_errors), "nothing is off besides"

@@ -15,7 +15,8 @@ from fieldcal.cli import main
 from fieldcal.diagnosis.result import Diagnosis
 
 AMID = ((1, 6), pytest.param(5, len(LADDER), marks=pytest.mark.thorough))
-"""Positions, and of how many: amid the session; at its ends a step of the bias would do as well."""
+"""Positions, and of how many: amid the session; at its ends a step of the bias would
+do as well."""
 
 
 def off(window: int, axis: int, size: float) -> Fault:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
+import ladder
+import pytest
 from ladder import (
     HEIGHT_M,
     LADDER,
@@ -21,6 +24,12 @@ from session_folders import write_session
 from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.result import Diagnosis
 from fieldcal.session.folder import Session
+
+
+def hold_first(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hold so many positions of the ladder only."""
+    for module in (ladder, sys.modules[__name__]):
+        monkeypatch.setattr(module, "LADDER", LADDER[:count])
 
 
 def tables(device: Device) -> dict[str, Any]:

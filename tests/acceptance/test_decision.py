@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +29,7 @@ from fieldcal.core.positions import (
     Position,
 )
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.solution import PreparedSession
 from fieldcal.history.family import next_run_distribution
 from fieldcal.session import description
 from fieldcal.session.folder import Session
@@ -467,6 +468,22 @@ def test_missing_samples_that_the_times_cannot_show_are_not_counted() -> None:
     assert [c.ok for c in check_link({**LINK, "missing": 50}, BOUNDS)] == [False, True]
 
 
+LAST = {"alpha_deg": NINE[5][0], "beta_deg": NINE[5][1]}
+
+
+@pytest.fixture(scope="module")
+def five_held_of_six(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[Path, Calibration]:
+    """A session of five positions, in which a sixth was held to verify, solved."""
+    folder, held = tmp_path_factory.mktemp("six") / "s", places(NINE[:6], 10.0, 5.0)
+    block = recorded(CALM, held)
+    write_session(folder, block, held[:5], site=SITE, verification=LAST)
+    session = Session.open(folder)
+    windows = usable_windows(session)
+    return folder, solve(PreparedSession(session, windows).observations)
+
+
 @pytest.mark.parametrize(
     ("spans", "says", "ok"),
     [
@@ -484,14 +501,13 @@ def test_a_verification_window_without_samples_is_told_from_none(
     spans: list[tuple[float, float] | None],
     says: str,
     ok: bool | None,
+    five_held_of_six: tuple[Path, Calibration],
     tmp_path: Path,
 ) -> None:
     """It was asked for, so that it is missing is NO-GO; a discarded one is none."""
-    held = places(NINE[:6])
-    last = {"alpha_deg": NINE[5][0], "beta_deg": NINE[5][1]}
-    block = recorded(CALM, held)
-    write_session(tmp_path / "s", block, held[:5], site=SITE, verification=last)
-    start, lines = held[5]["start_s"], []
+    solved, found = five_held_of_six
+    shutil.copytree(solved, tmp_path / "s")
+    start, lines = places(NINE[:6], 10.0, 5.0)[5]["start_s"], []
     for span in spans:
         mark: dict[str, object] = {"event": "repeated", "position": 5}
         if span is not None:
@@ -501,7 +517,6 @@ def test_a_verification_window_without_samples_is_told_from_none(
     (tmp_path / "s" / "marks.jsonl").write_text("".join(lines))
     session = Session.open(tmp_path / "s")
     windows = usable_windows(session)
-    found = solve_session(session, windows)
     made = assessment.assess(found, session, windows, limits.read("tactical"), None)
     checks = made.info["decision"]["checks"]
     (check,) = [c for c in checks if c["name"] == "verification"]
@@ -522,9 +537,8 @@ def test_a_verification_is_set_as_well_as_the_session_says(
     )
     held = places(NINE[:6])
     site = dict(SITE) if stated is None else {**SITE, "angle_setting_deg": stated}
-    last = {"alpha_deg": NINE[5][0], "beta_deg": NINE[5][1]}
     block = recorded(CALM, held)
-    write_session(tmp_path / "s", block, held[:5], site=site, verification=last)
+    write_session(tmp_path / "s", block, held[:5], site=site, verification=LAST)
     span = {key: held[5][key] for key in ("start_s", "end_s")}
     mark = {"event": "window", "position": 5, **span}
     (tmp_path / "s" / "marks.jsonl").write_text(json.dumps(mark) + "\n")

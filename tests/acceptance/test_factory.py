@@ -29,6 +29,9 @@ G = 9.81
 NINE = tuple(Position.deg(a, b) for a in (-45, 0, 45) for b in (-30, 0, 30))
 SEEDS = [0, *(pytest.param(s, marks=pytest.mark.thorough) for s in (1, 2, 3))]
 
+FAR_OFF = 4
+"""Devices that show that a plain estimate is off: it is by several sigma."""
+
 
 def found(square: float, positions: tuple[Position, ...] = SIX_FACES) -> Calibration:
     seen = observe(positions, specific_forces(positions, G), sigma=1e-4)
@@ -85,13 +88,13 @@ def test_what_is_unknown_of_it_is_in_every_uncertainty(seed: int) -> None:
     rng = np.random.default_rng(seed)
     off: list[Array] = []
     plain: list[Array] = []
-    for _ in range(25):
+    for k in range(25):
         mixing = np.eye(3) + rng.normal(0, 5e-4, (3, 3)) * (1 - np.eye(3))
         mean = specific_forces(FIVE_POSITIONS, G) @ mixing.T + rng.normal(
             0, 1e-4, (len(FIVE_POSITIONS), 3)
         )
         seen = observe(FIVE_POSITIONS, mean, sigma=1e-4)
-        for square, pulls in ((5e-4, off), (0.0, plain)):
+        for square, pulls in ((5e-4, off), (0.0, plain))[: 2 if k < FAR_OFF else 1]:
             result = solve(seen, tilt="none", factory=FactoryErrors(square))
             pulls += plain_pulls(result)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.2)
@@ -105,14 +108,15 @@ def test_bent_accelerometers_are_in_every_uncertainty(seed: int) -> None:
     rng = np.random.default_rng(seed)
     off: list[Array] = []
     plain: list[Array] = []
-    for _ in range(25):
+    for k in range(25):
         force = specific_forces(FIVE_POSITIONS, G)
         bent = rng.normal(0, 2e-5, 3) * force**2
         bent += rng.normal(0, 1.961e-4, 3) * np.abs(force)  # as much at 1 g
         bent += rng.normal(0, 2.039e-7, 3) * force**3  # as much at 10 g
         mean = force + bent + rng.normal(0, 1e-4, (len(FIVE_POSITIONS), 3))
         seen = observe(FIVE_POSITIONS, mean, sigma=1e-4)
-        for left, pulls in ((FactoryErrors(0.0, 2e-5), off), (FactoryErrors(), plain)):
+        both = ((FactoryErrors(0.0, 2e-5), off), (FactoryErrors(), plain))
+        for left, pulls in both[: 2 if k < FAR_OFF else 1]:
             result = solve(seen, tilt="none", factory=left)
             pulls += plain_pulls(result)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
@@ -136,14 +140,12 @@ def test_what_a_turn_leaves_is_in_every_uncertainty() -> None:
     rng, off, plain = np.random.default_rng(1), list[Array](), list[Array]()
     force = specific_forces(SIX_FACES, G)
     came = np.vstack([np.zeros(3), np.clip(np.diff(force, axis=0) / 9.80665, -1, 1)])
-    for _ in range(20):
+    for k in range(20):
         mean = force + rng.normal(0, 5e-4, 3) * came
         mean += rng.normal(0, 1e-5, force.shape)
         seen = observe(SIX_FACES, mean, sigma=1e-5)
-        for left, pulls in (
-            (FactoryErrors(hysteresis=5e-4), off),
-            (FactoryErrors(), plain),
-        ):
+        both = ((FactoryErrors(hysteresis=5e-4), off), (FactoryErrors(), plain))
+        for left, pulls in both[: 2 if k < FAR_OFF else 1]:
             result = solve(seen, tilt="none", factory=left)
             pulls += plain_pulls(result)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
@@ -162,7 +164,7 @@ def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) ->
     left = FactoryErrors(**PER_K, warming_k=1.25)
     course = x.warming if shown else 1.25 * np.exp(-x.since_start / 300)
     end = 2e-3 * x.t[-1] if shown else 1.25 * np.exp(-x.since_start[-1] / 300)
-    for _ in range(10):
+    for k in range(10):
         drift = rng.normal(0, np.repeat([5e-4, 1e-5], 3))
         y = np.hstack([x.f, x.w]) + drift * course[:, None]
         y += SD / 20 * rng.standard_normal(y.shape)
@@ -170,7 +172,8 @@ def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) ->
         recorded = RecordedRows(
             replace(rows, sd=rows.sd / 20), np.array([x.since_turn])
         )
-        for factory, pulls in ((left, off), (FactoryErrors(), plain)):
+        both = ((left, off), (FactoryErrors(), plain))
+        for factory, pulls in both[: 2 if k < FAR_OFF else 1]:
             found = estimate_parameters(
                 recorded, None, nominal(), replace(wanted, factory=factory)
             )

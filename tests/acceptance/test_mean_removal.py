@@ -71,9 +71,9 @@ def test_a_bias_or_the_earths_rate_stands_out() -> None:
     for bias, earth in ((1e-3, 0.0), (-1e-4, 0.0), (0.0, EARTH)):
         found = [
             bias_removal_probability(*at_rest(rng, bias, earth=earth), KEEPS, LEAST)[0]
-            for _ in range(10)
+            for _ in range(6)
         ]
-        assert np.mean(np.array(found) > DOUBT) <= 0.1
+        assert max(found) <= DOUBT
 
 
 def test_so_noisy_a_device_may_be_at_zero_by_chance() -> None:
@@ -97,14 +97,14 @@ def test_what_is_tracked_is_seen_behind_lines_between_samples(each: int) -> None
     """A program that drew them left less noise than means have; a bias stays one."""
     rng, found = np.random.default_rng(14), []
     for bias in (0.0, 2e-3):
-        for _ in range(10):
+        for _ in range(5):
             windows, block = at_rest(rng, bias)
             lines = [
                 np.interp(block.t, block.t[::each], w[::each]) for w in block.gyr.T
             ]
             block.gyr[:] = np.column_stack(lines)
             found.append(bias_removal_probability(windows, block, KEEPS, LEAST)[0])
-    assert min(found[:10]) > DOUBT > 1e-3 > max(found[10:])
+    assert min(found[:5]) > DOUBT > 1e-3 > max(found[5:])
 
 
 def zeroed_at_rest(

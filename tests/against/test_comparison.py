@@ -87,6 +87,7 @@ def value(found: Match, name: str, parameter: str) -> tuple[float, float]:
     return float(off.value), off.sigma
 
 
+@pytest.mark.thorough
 def test_a_simulator_that_is_like_the_device_agrees(real: DiagnosedRecording) -> None:
     found = against(real, DEVICE)
     assert found.verdict == "consistent" and not found.differences
@@ -126,6 +127,21 @@ def test_numbers_of_an_effect_are_told_with_it_on_all_axes() -> None:
     assert with_all_parameters((drift, exact))[1] is exact
 
 
+def test_what_is_alike_is_told_beside_what_differs(real: DiagnosedRecording) -> None:
+    found = against(real, {"matrix": DEVICE["matrix"]})
+    assert found.alike == ("cross_coupling",)
+    said = {(d.id, d.direction) for d in found.differences}
+    assert said == {
+        ("acc_bias", "resized"), ("gyr_bias", "resized"), ("noise", "left_out")
+    }  # fmt: skip
+    for name, group in (("acc_bias", "acc"), ("gyr_bias", "gyr")):
+        off: Array = np.array([value(found, name, axis) for axis in "xyz"])
+        assert (np.abs(off[:, 0] - DEVICE["bias"][group]) < 4 * off[:, 1]).all()
+    assert found.before.chi2_per_dof > 100 and found.after.chi2_per_dof < 1.2
+    assert any("next to no noise" in warning for warning in found.warnings)
+
+
+@pytest.mark.thorough
 def test_a_perfect_simulator_leaves_out_everything(real: DiagnosedRecording) -> None:
     found = against(real, {})
     said = {(d.id, d.direction) for d in found.differences}

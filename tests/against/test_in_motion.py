@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_circle import one_in
 from driven_like import DRIVE, written
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
@@ -208,7 +207,13 @@ def test_stamps_of_a_coarse_clock_are_told_from_samples_that_are_uneven(
     assert not {d.id for d in kept.differences} - CALIBRATION
 
 
-@pytest.mark.parametrize("name", one_in(4, [(name,) for name in IN_MOTION]))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[] if name == "stamp_error" else pytest.mark.thorough)
+        for name in IN_MOTION
+    ],
+)
 def test_what_only_motion_shows_is_named_of_the_virtual_device(name: str) -> None:
     angles = ((0, 0), (90, 40), (-60, 0), (30, -70), (0, 80), (-90, -30)) * 2
     windows = [

@@ -60,7 +60,9 @@ def test_each_count_is_what_it_was(kind: str, bias: float) -> None:
         assert found == [{"channel": name, "kind": kind}]
         np.testing.assert_allclose(told.block.six, whole, rtol=1e-6, atol=1e-9)
         tried += 1
-    assert tried >= 3
+        if tried == 3:
+            break
+    assert tried == 3
 
 
 def test_single_wild_values_are_replaced_at_rest_and_on_the_way() -> None:

@@ -9,13 +9,14 @@ import ladder
 import numpy as np
 import pytest
 from ladder import LADDER, TACTICAL, Array, Fault, Ride, windows
-from ladder_sessions import agrees, diagnosed, named
+from ladder_sessions import agrees, diagnosed, hold_first, named
 
 from fieldcal.cli import main
 from fieldcal.diagnosis.result import Diagnosis
 
-AMID = (1, pytest.param(5, marks=pytest.mark.thorough))
-"""Positions amid the session; at its ends a step of the bias would do as well."""
+AMID = ((1, 6), pytest.param(5, len(LADDER), marks=pytest.mark.thorough))
+"""Positions, and of how many: amid the session; at its ends a step of the bias would
+do as well."""
 
 
 def off(window: int, axis: int, size: float) -> Fault:
@@ -71,9 +72,12 @@ def places(said: Diagnosis) -> set[tuple[str, tuple[int, ...]]]:
     return {(m.channel, m.positions) for m in said.mismatch if m.kind == "position"}
 
 
-@pytest.mark.parametrize("window", AMID)
-def test_one_axis_in_one_position(window: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("window", "held"), AMID)
+def test_one_axis_in_one_position(
+    window: int, held: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     axis = window % 3
+    hold_first(held, monkeypatch)
     said = diagnosed(tmp_path / "s", TACTICAL, off(window, axis, 0.006), seed=window)
     assert said.verdict == "unexplained" and not named(said)
     assert places(said) == {("a" + "xyz"[axis], (window,))}
@@ -110,9 +114,8 @@ def test_angles_that_were_set_otherwise_are_said(
             assert f"{joint} had been" not in said.says
 
 
-@pytest.mark.parametrize(
-    ("one", "two"), [(2, 6), pytest.param(0, 7, marks=pytest.mark.thorough)]
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize(("one", "two"), [(2, 6), (0, 7)])
 def test_two_positions_in_the_wrong_order_are_said(
     one: int, two: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ladder import TACTICAL, Array, Fault, Ride
-from ladder_sessions import agrees, diagnosed, named
+from ladder import LADDER, TACTICAL, Array, Fault, Ride
+from ladder_sessions import agrees, diagnosed, hold_first, named
 
 SEEDS = (1, pytest.param(2, marks=pytest.mark.thorough))
 
@@ -39,17 +39,29 @@ def coupled(row: int, column: int, size: float) -> Fault:
 
 
 @pytest.mark.parametrize(
-    ("seed", "at_s", "sizes"),
+    ("held", "seed", "at_s", "sizes"),
     [
-        pytest.param(1, 145.4, {"ay": 0.03, "ax": -0.02}, marks=pytest.mark.thorough),
-        (2, 150.0, {"ay": 0.0135}),
-        pytest.param(3, 96.5, {"gz": 0.001}, marks=pytest.mark.thorough),
-        pytest.param(6, 139.3, {"gz": 0.0005, "ax": 0.002}, marks=pytest.mark.thorough),
+        (6, 2, 100.0, {"ay": 0.0135}),
+        *(
+            pytest.param(len(LADDER), *case, marks=pytest.mark.thorough)
+            for case in (
+                (1, 145.4, {"ay": 0.03, "ax": -0.02}),
+                (2, 150.0, {"ay": 0.0135}),
+                (3, 96.5, {"gz": 0.001}),
+                (6, 139.3, {"gz": 0.0005, "ax": 0.002}),
+            )
+        ),
     ],
 )
 def test_a_jump_amid_a_window_is_no_bump_and_has_its_size(
-    seed: int, at_s: float, sizes: dict[str, float], tmp_path: Path
+    held: int,
+    seed: int,
+    at_s: float,
+    sizes: dict[str, float],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    hold_first(held, monkeypatch)
     said = diagnosed(tmp_path / "s", TACTICAL, jump(at_s, **sizes), seed=seed)
     assert named(said) == ["bias_step"]
     agrees(said, "bias_step", {**sizes, "at_s": at_s})

@@ -11,10 +11,12 @@ from session_folders import places, recorded, write_session
 
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis import Diagnosis, diagnose
+from fieldcal.diagnosis.result import Curve
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import parse
 
+CLIMATE = Climate(points=((0.0, 20.0), (120.0, 30.0), (250.0, 22.0)))
 QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
 
 
@@ -25,6 +27,17 @@ def found_in(folder: Path, *effects: str, seed: int = 1, **more: object) -> Diag
         write_session(folder, recorded(device, positions, seed), positions)
     )
     return diagnose(session.block, session.about)
+
+
+@pytest.fixture(scope="module")
+def warmed(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
+    """A bias that follows a temperature, and three seconds of a stuck gyroscope."""
+    return found_in(
+        tmp_path_factory.mktemp("warmed"),
+        "temperature_bias:ax=0.01",
+        "stuck:channel=gy,from_s=40,to_s=43",
+        temperature=CLIMATE,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -67,40 +80,40 @@ def test_scatter_is_not_predicted_by_an_equation(tmp_path: Path) -> None:
     assert any("average out" in text for text in found.next)
 
 
+def test_residuals_over_the_temperature_that_they_follow(warmed: Diagnosis) -> None:
+    curve = follows(warmed, "temperature", "°C")
+    assert 20 < curve.x.min() < 23 and 28 < curve.x.max() < 33
+    assert abs(np.corrcoef(curve.x, curve.before)[0, 1]) > 0.9
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("concealed", "covariate", "unit"),
     [
-        ("temperature_bias:ax=0.01", "temperature", "°C"),
-        pytest.param(
-            "settling:ax=0.05,tau_s=4",
-            "time since the turn",
-            "s",
-            marks=pytest.mark.thorough,
-        ),
-        pytest.param(
-            "base_tilt:about_z_deg=1", "position", "", marks=pytest.mark.thorough
-        ),
+        ("settling:ax=0.05,tau_s=4", "time since the turn", "s"),
+        ("base_tilt:about_z_deg=1", "position", ""),
     ],
 )
 def test_residuals_over_what_they_follow(
     concealed: str, covariate: str, unit: str, tmp_path: Path
 ) -> None:
-    climate = Climate(points=((0.0, 20.0), (120.0, 30.0), (250.0, 22.0)))
-    found = found_in(tmp_path, concealed, temperature=climate)
+    follows(found_in(tmp_path, concealed, temperature=CLIMATE), covariate, unit)
+
+
+def follows(found: Diagnosis, covariate: str, unit: str) -> Curve:
+    """The curve of a_x, which follows something that is taken out of it."""
     curve = next(c for c in found.curves if c.channel == "ax")
     assert (curve.covariate, curve.unit) == (covariate, unit)
     before, after = curve.before / curve.sigma, curve.after / curve.sigma
     assert np.sqrt(np.mean(before**2)) > 3 * np.sqrt(np.mean(after**2))
     assert 0.7 < np.sqrt(np.mean(after**2)) < 1.8
     assert curve.channel in CHANNELS and set(curve.position) == set(range(9))
-    if unit == "°C":
-        assert 20 < curve.x.min() < 23 and 28 < curve.x.max() < 33
-        assert abs(np.corrcoef(curve.x, curve.before)[0, 1]) > 0.9
+    return curve
 
 
-def test_what_to_do_next(tilted: Diagnosis) -> None:
-    found = tilted
+def test_what_to_do_next(warmed: Diagnosis) -> None:
+    found = warmed
     cures = [text.partition(":")[0] for text in found.next]
-    assert cures[:2] == ["base_tilt", "stuck at position 2"]
-    assert any('effects = ["base_tilt"]' in text for text in found.next)
+    assert cures[:2] == ["temperature_bias", "stuck at position 2"]
+    assert any('effects = ["temperature_bias"]' in text for text in found.next)
     assert found.to_json()["next"] == list(found.next)

@@ -81,3 +81,8 @@ def test_positions_are_exchanged_if_each_was_held_where_the_other_is(
     )
     standing = ProbableCause("misset", members, 1.0, ())
     assert exchanged_positions(explanation, standing) == exchanged
+    off_there = [off_in((2,)), off_in((5,))]
+    told = unknown_mismatches(explanation, standing, off_there)
+    for one in told:
+        assert one.exchanged == (exchanged[0] if exchanged else ())
+        assert not (exchanged and one.angle_errors), "nothing is off besides"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from few_channels import only
 
 from benchmarks.noise.processes import covariance, noise, recording
 from fieldcal.core.samples import Array
@@ -113,7 +114,7 @@ def test_sizes_are_drawn_from_their_likelihood() -> None:
 
 
 def test_the_score_is_a_density() -> None:
-    values = noise(np.random.default_rng(18), 6000, 0.1, 6, N=1.0)
+    values = only(noise(np.random.default_rng(18), 6000, 0.1, 6, N=1.0), 0)
     model = estimate_noise([reduce_recording([recording(values, 0.1)])]).channels["ax"]
     said = model.predict_allan(np.array([20.0]), 600.0)
     grid = np.linspace(np.log(said.median[0]) - 3, np.log(said.median[0]) + 3, 400)

@@ -54,7 +54,7 @@ def own(folder: Path) -> Path:
     session = folder / "own"
     if not session.exists():
         five_positions(session, {"device": {"name": HOSTILE}})
-        assert main(["solve", str(session)]) == 0
+        assert main(["solve", str(session), "--as-printed"]) == 0
         assert main(["report", str(session), "--earlier", str(session)]) == 0
     return session / "report.html"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_sessions import dictionary, ladder
@@ -9,6 +11,7 @@ from small_sessions import dictionary, ladder
 from fieldcal.diagnosis.findings.unknown_mismatch import UnknownMismatch
 from fieldcal.diagnosis.result import Mismatch
 from fieldcal.diagnosis.wording.advice import MISMATCH_REMEDIES, advice_on_mismatches
+from fieldcal.diagnosis.wording.paragraph import exchange_text
 
 
 def unknown(
@@ -39,6 +42,18 @@ def test_what_follows_the_time_may_follow_a_temperature() -> None:
         "Hold one position for longer, and record the temperature: ay and az follow the"
         " time, as biases do that follow a temperature, and no effect in the catalogue"
         " does."
+    )
+
+
+def test_angles_of_exchanged_positions_are_exchanged() -> None:
+    pair = replace(unknown("position"), exchanged=(2, 6))
+    (said,) = advice_on_mismatches([pair, pair])
+    assert said == (
+        "Exchange the angles of positions 3 and 7 in session.toml: each was held at"
+        " those of the other."
+    )
+    assert exchange_text((2, 6)) == (
+        "positions 3 and 7 are exchanged: each was held at the angles of the other"
     )
 
 

@@ -103,6 +103,7 @@ DISTINCT = frozenset(
         "PX4, appended",
         "full sphere",
         "phone",
+        "ArduPilot, telemetry",
         "VectorNav",
         "MicroStrain",
     ]

@@ -20,8 +20,9 @@ def turned(seed: int, rate: float, hold: float = 3.0) -> Array:
         axis, steps = np.cross(up, side), int(1.5 * rate)
         angle = (1 - np.cos(np.pi * (np.arange(steps) + 0.5) / steps)) * np.pi / 4
         speed = np.gradient(angle, 1 / rate)
+        across = np.cross(axis, up)
         for a, w in zip(angle, speed, strict=True) if axis.any() else ():
-            now = np.cos(a) * up + np.sin(a) * np.cross(axis, up)
+            now = np.cos(a) * up + np.sin(a) * across
             rows.append([*G * now, *(-w * axis)])
         up = np.array(side, float)
         rows += [[*G * up, 0, 0, 0]] * int(hold * rate)

@@ -19,13 +19,15 @@ ROOT = Path(__file__).parent.parent
 CODE = ("fieldcal", "drivers", "procedures", "sim_device", "benchmarks", "tests")
 TREE = (*CODE, "pyproject.toml")
 ADDED = {
-    "tests/diagnosis/test_diagnosis_contract.py": "temperature_curve",
     "tests/effects/test_effects.py": "temperature_curve or TemperatureCurve",
     "tests/sim_device/test_sim_effects.py": "temperature_curve",
     "tests/benchmarks_check/test_concealed_sessions.py": "temperature_curve or kind",
     "tests/drivers/test_wires_meet.py": "logger or writes",
 }
 """Tests that walk what there is, and what they are to find there."""
+
+DIAGNOSED = ("tests/diagnosis/test_diagnosis_contract.py", "temperature_curve")
+"""The same, where each that is found is diagnosed."""
 
 
 def diffs() -> list[str]:
@@ -70,14 +72,24 @@ def test_what_is_added_is_new_files_alone() -> None:
     assert not [new for _, new in heads if (ROOT / new).exists()]
 
 
+# most effects are left out of the circle without --all
+PYTEST = ("-m", "pytest", "-q", "--all", "-p", "no:cacheprovider")
+
+
 def test_the_tests_that_walk_what_there_is_find_what_was_added(tree: Path) -> None:
     chosen = " or ".join(f"({words})" for words in ADDED.values())
-    # most effects are left out of the circle without --all
-    pytest_ = ["-m", "pytest", "-q", "--all", "-p", "no:cacheprovider", "-rA"]
-    done = ran(tree, *pytest_, "-k", chosen, *ADDED)
+    done = ran(tree, *PYTEST, "-rA", "-k", chosen, *ADDED)
     assert done.returncode == 0, done.stdout
     for file in ADDED:
         assert f"PASSED {file}" in done.stdout, file
+
+
+@pytest.mark.thorough
+def test_an_effect_that_was_added_is_diagnosed(tree: Path) -> None:
+    file, name = DIAGNOSED
+    done = ran(tree, *PYTEST, "-rA", "-k", name, file)
+    assert done.returncode == 0, done.stdout
+    assert f"PASSED {file}::test_put_in_and_named[{name}]" in done.stdout
 
 
 def test_a_command(tree: Path) -> None:

@@ -7,11 +7,23 @@ import sys
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import pytest
+
 EXAMPLE = Path(__file__).parent / "example_project"
 
 
-def test_the_example_project_passes_with_the_plugin_that_pytest_found() -> None:
+@pytest.mark.parametrize(
+    ("chosen", "passed"),
+    [
+        ("not five_positions", 5),
+        pytest.param("five_positions", 1, marks=pytest.mark.thorough),
+    ],
+)
+def test_the_example_project_passes_with_the_plugin_that_pytest_found(
+    chosen: str, passed: int
+) -> None:
     call = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    call += ["-k", chosen]
     done = subprocess.run(
         [*call, "--rootdir", str(EXAMPLE), "-c", str(EXAMPLE / "pyproject.toml")],
         cwd=EXAMPLE,
@@ -20,7 +32,7 @@ def test_the_example_project_passes_with_the_plugin_that_pytest_found() -> None:
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "5 passed" in done.stdout
+    assert f"{passed} passed" in done.stdout
 
 
 def test_whoever_does_not_use_it_does_not_pay_for_it() -> None:

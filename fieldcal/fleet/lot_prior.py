@@ -189,7 +189,8 @@ class _UnitInformation:
             )
             seen = np.linalg.solve(root, self.rhs[..., None])
             rhs = (self.rhs - (half.transpose(0, 2, 1) @ seen)[..., 0]).sum(axis=0)
-            mu = rng.multivariate_normal(both @ rhs, both)  # (2)
+            # `both` is the inverse of a sum of information: nothing to be checked
+            mu = rng.multivariate_normal(both @ rhs, both, check_valid="ignore")  # (2)
             white = np.linalg.solve(root, (self.rhs + inverse @ mu)[..., None])
             white += rng.standard_normal((n, k, 1))
             theta = np.linalg.solve(root.transpose(0, 2, 1), white)[..., 0]  # (3)

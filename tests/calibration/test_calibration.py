@@ -82,7 +82,7 @@ def test_uncertainty_of_samples_is_that_of_many_calibrations() -> None:
     drawn = [
         made(cov, values=VALUES + np.linalg.cholesky(cov) @ rng.standard_normal(15))
         .apply(raw).six
-        for _ in range(3000)
+        for _ in range(1000)
     ]  # fmt: skip
     np.testing.assert_allclose(np.std(drawn, axis=0), stated, rtol=0.08)
 
@@ -96,7 +96,7 @@ def test_comparison_is_a_fair_test() -> None:
     def draw() -> Calibration:
         return made(cov, values=VALUES + factor @ rng.standard_normal(15))
 
-    found = [compare(draw(), draw()) for _ in range(1500)]
+    found = [compare(draw(), draw()) for _ in range(700)]
     assert np.mean([c.chi2 for c in found]) == pytest.approx(15, rel=0.04)
     assert np.mean([c.chance < 0.05 for c in found]) == pytest.approx(0.05, abs=0.02)
     assert np.std([c.z for c in found]) == pytest.approx(1, abs=0.03)

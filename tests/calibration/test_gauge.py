@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
-from session_folders import places, recorded, write_session
+from session_folders import NINE, places, recorded, write_session
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.document import schema
@@ -34,7 +34,7 @@ SEEN = {"gyr_bias": (0.011, -0.02, 0.006)}
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """One session in SI, and the same in counts and in volts."""
     device = Profile(effects=(parse("earth_rate:"), parse(COUPLED)))
-    positions, out = places(seconds=15.0), {}
+    positions, out = places(NINE[:6], seconds=15.0), {}
     block = recorded(device, positions)
     for unit, acc, gyr in (("SI", 1.0, 1.0), ("count", ACC, GYR), ("V", 0.2, 3.0)):
         folder = tmp_path_factory.mktemp(unit)

@@ -47,7 +47,7 @@ def test_the_spread_is_that_of_units_without_their_errors() -> None:
 def test_what_is_said_of_spread_and_capability_is_what_they_scatter_by() -> None:
     rng = np.random.default_rng(11)
     drawn = []
-    for _ in range(75):
+    for _ in range(50):
         sigma = rng.uniform(0.01, 0.03, 60)
         x = 0.05 + 0.02 * rng.standard_normal(60) + sigma * rng.standard_normal(60)
         drawn.append(
@@ -243,7 +243,7 @@ def test_a_unit_without_a_station_hides_no_shift_of_the_others() -> None:
 def test_a_lot_in_control_is_said_to_be() -> None:
     calm = []
     for seed in range(10, 16):
-        some = [s for s in units(seed=seed) if s.serial not in ("A10", "A90")]
+        some = [s for s in units(80, seed) if s.serial not in ("A10", "A90")]
         calm.append(of(some).in_control)
     assert sum(calm) >= 4, "odd units and charts have five in a hundred each"
 

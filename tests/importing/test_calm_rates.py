@@ -13,7 +13,7 @@ from fieldcal.importing.units.calm_rates import DEG, RAD, guess_unit_of_calm_rat
 from fieldcal.importing.units.rate_size import TurnComparison
 from fieldcal.session.folder import Session
 
-G, RATE = 9.80665, 100.0
+G, RATE = 9.80665, 50.0
 ROS = (
     "%time,field.header.seq,field.header.stamp,"
     + ",".join(f"field.angular_velocity.{x}" for x in "xyz")

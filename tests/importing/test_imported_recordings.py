@@ -95,6 +95,22 @@ COMMANDS: dict[str, tuple[list[str], list[str], dict[str, Found]]] = {
 }  # fmt: skip
 
 
+DISTINCT = frozenset(
+    [
+        "annotated faces",
+        "short static in counts",
+        "PX4, three sensors",
+        "PX4, appended",
+        "full sphere",
+        "phone",
+        "ArduPilot, telemetry",
+        "VectorNav",
+        "MicroStrain",
+    ]
+)
+"""Each of another format, or with something that no other has."""
+
+
 def files(names: list[str]) -> list[str]:
     paths = [REAL / name for name in names]
     if absent := [path for path in paths if not path.is_file()]:
@@ -110,7 +126,13 @@ def imported(folder: Path) -> dict[str, Any]:
     return mark(folder, "imported")
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in DISTINCT else pytest.param(name, marks=pytest.mark.thorough)
+        for name in COMMANDS
+    ],
+)
 def test_a_recording_is_brought_in_as_its_provenance_says(
     name: str, tmp_path: Path
 ) -> None:

@@ -122,9 +122,19 @@ def in_turn(rows: Array) -> str:
 
 
 @pytest.mark.parametrize(
-    "stamp", ["0.5", "", pytest.param("9999", marks=pytest.mark.thorough)]
+    ("way", "stamp"),
+    [
+        ("zip", "0.5"),
+        ("join", ""),
+        ("in turn", "0.5"),
+        ("in turn", ""),
+        pytest.param("zip", "", marks=pytest.mark.thorough),
+        pytest.param("join", "0.5", marks=pytest.mark.thorough),
+        pytest.param("zip", "9999", marks=pytest.mark.thorough),
+        pytest.param("join", "9999", marks=pytest.mark.thorough),
+        pytest.param("in turn", "9999", marks=pytest.mark.thorough),
+    ],
 )
-@pytest.mark.parametrize("way", ["zip", "join", "in turn"])
 def test_a_wrong_time_of_the_gyroscope_costs_its_own_sample_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], way: str, stamp: str
 ) -> None:

@@ -45,7 +45,15 @@ def message(name: str, t: float, a: Array, w: Array) -> str:
     return f"{'%' if 'S' in name else '#'}{text}*{crc(text):08x}"
 
 
-@pytest.mark.parametrize("name", ["RAWIMUA", "RAWIMUSA", "RAWIMUXA", "RAWIMUSXA"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "RAWIMUA",
+        "RAWIMUSXA",
+        pytest.param("RAWIMUSA", marks=pytest.mark.thorough),
+        pytest.param("RAWIMUXA", marks=pytest.mark.thorough),
+    ],
+)
 def test_each_message_becomes_a_row_between_others(tmp_path: Path, name: str) -> None:
     rows = turned(4, RATE, hold=4.0)
     lines = [message(name, r[0], r[1:4], r[4:]) for r in rows]

@@ -44,7 +44,9 @@ def test_a_short_log_that_may_be_slow_is_asked_about(tmp_path: Path) -> None:
         read_files([write(tmp_path, rows, heading=NAMES)])
 
 
-@pytest.mark.parametrize("rate", [100.0, 250.0, 500.0])
+@pytest.mark.parametrize(
+    "rate", [100.0, pytest.param(250.0, marks=pytest.mark.thorough), 500.0]
+)
 def test_a_fast_log_in_ms_is_one(tmp_path: Path, rate: float) -> None:
     rows = turned(4, rate, 1.0)
     rows[:, 0] *= 1e3

@@ -30,7 +30,7 @@ HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
 
 def recalibrated(folder: Path, has: str) -> tuple[int, Any]:
     folder.parent.mkdir(exist_ok=True)
-    device = ["--mavlink", f"tcpin:127.0.0.1:0?{has}", "--rate", "200"]
+    device = ["--mavlink", f"tcpin:127.0.0.1:0?{has}", "--rate", "100"]
     virtual = f"--virtual={shlex.join([*device, *steady(folder.parent)])}"
     run = [*TWO_POSITION, "--seconds", "10", "--speed", "20", "--json"]
     run += ["-o", str(folder), virtual]

@@ -65,14 +65,14 @@ def restarted(
     folder = tmp_path_factory.mktemp("restarted")
     session, truth = folder / "s", folder / "truth.json"
     sim = ["--mavlink", "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5", "--speed", "20"]
-    sim += ["--rate", "200", "--gravity=9.81", "--truth", str(truth)]
+    sim += ["--rate", "100", "--gravity=9.81", "--truth", str(truth)]
     sim += steady(folder)
     with simulated(*sim) as (place, control):
         url = f"mavlink:{place}"
         run = [*TWO_POSITION, "--gravity=9.81", "--seconds", "20", "--json"]
         run += ["-o", str(session)]
         with subprocess.Popen(
-            [*run, "--device", f"{url}?rate=200"], stdout=subprocess.PIPE, text=True
+            [*run, "--device", f"{url}?rate=100"], stdout=subprocess.PIPE, text=True
         ) as process:
             wait(process, lambda: len(events(session, "window")) == 1)
             order(control, fault={"reboot_s": 3.0})

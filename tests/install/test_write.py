@@ -145,7 +145,7 @@ def test_what_was_not_determined_is_kept_as_the_table_says(taken_out: bool) -> N
 
 def test_the_uncertainty_of_a_parameter_is_that_of_many_calibrations() -> None:
     rng, found = np.random.default_rng(1), calibration()
-    drawn = rng.multivariate_normal(found.values, found.covariance, 4000)
+    drawn = rng.multivariate_normal(found.values, found.covariance, 1500)
     there = installed()
     new = np.array(
         [

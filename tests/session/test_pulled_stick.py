@@ -122,7 +122,7 @@ def test_what_was_on_the_disk_is_there_when_it_is_plugged_in_again(
 
 
 def test_what_was_imported_is_on_the_disk(stick: Stick, tmp_path: Path) -> None:
-    rows = np.random.default_rng(1).normal(0, 0.01, (20_000, 6)) + [0, 0, 9.8, 0, 0, 0]
+    rows = np.random.default_rng(1).normal(0, 0.01, (2_000, 6)) + [0, 0, 9.8, 0, 0, 0]
     np.savetxt(tmp_path / "x.csv", rows, delimiter=",")
     text, folder = str(tmp_path / "x.csv"), stick.folder / "x"
     wanted = ("--columns", "ax,ay,az,gx,gy,gz", "--rate", "100")
@@ -132,4 +132,4 @@ def test_what_was_imported_is_on_the_disk(stick: Stick, tmp_path: Path) -> None:
     assert stick.plug()
     assert {path.name for path in stick.folder.iterdir()} == {"lost+found", "x"}
     assert not list(file_faults(folder))
-    assert len(Session.open(folder).block) == 20_000
+    assert len(Session.open(folder).block) == 2_000

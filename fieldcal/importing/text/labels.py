@@ -97,6 +97,9 @@ _ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*(?:->|>|:|\s)\s
 _NAME = re.compile(r"\W*[A-Za-z][\w-]*:(?!\S)\W*")
 """What stands alone before the first label: a chip or a program."""
 
+_LETTER = re.compile("[A-Za-z_:]")
+"""What a line with labels has, and one of numbers alone has not."""
+
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _NAMED = re.compile(r"([A-Za-z_]\w*)\s*[:=]")
 
@@ -117,7 +120,7 @@ def labelled_values(line: str) -> list[Labelled]:
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
-    if len(line) > LONGEST:
+    if len(line) > LONGEST or not _LETTER.search(line):
         return []
     if plotted := _PLOTTED.fullmatch(line.strip()):
         return [(TICKS, plotted[2]), (plotted[1].strip(), plotted[3])]

@@ -209,6 +209,8 @@ class ArrivalPrefix(TextForm):
 
 def _arrival(line: str) -> re.Match[str] | None:
     """The time before a line; None of a line without one."""
+    if ":" not in line:
+        return None
     found = (form.match(line) for form in _ARRIVALS)
     return next((said for said in found if said is not None), None)
 

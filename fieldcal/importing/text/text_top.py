@@ -107,8 +107,8 @@ def is_number(cell: str, comma: bool) -> bool:
 
 def split_cells(line: str, separator: str | None) -> list[str]:
     """Cells of a line, without spaces and quotes about them."""
-    if separator is None and '"' not in line:
-        return line.split()
+    if '"' not in line:
+        return [*map(str.strip, line.split(separator))]
     return [cell.strip().strip('"').strip() for cell in line.split(separator)]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Self
 
 from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
-from fieldcal.importing.text.text_top import find_separator, split_cells
+from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
 from fieldcal.importing.words.heading_units import parse_unit
 
 _DOUBLE = re.compile(r"(?<![\w.])([-+]?(?:\d+\.?\d*|\.\d+))[dD]([-+]?\d{1,3})(?![\w.])")
@@ -104,5 +104,7 @@ def _unit_in(cell: str) -> str:
     >>> _unit_in("9.81 m/s²"), _unit_in("9.81"), _unit_in("12:30 s")
     ('m/s²', '', '')
     """
+    if is_number(cell, comma=False):
+        return ""
     said = _WITH_UNIT.fullmatch(cell)
     return said[2] if said is not None and parse_unit(said[2]) else ""

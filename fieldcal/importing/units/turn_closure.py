@@ -140,14 +140,13 @@ def _direction(up: Array) -> Array:
 def _closure_errors(turn: TurnBetweenRests, scales: Array) -> Array:
     """Closure of a turn at each of the scales (k,), rad."""
     u = np.tile(turn.before, (len(scales), 1))
-    for angle in turn.angles:
-        size = float(np.linalg.norm(angle))
-        if not size:
-            continue
-        axis, by = angle / size, size / scales[:, None]
+    size = np.array([np.linalg.norm(angle) for angle in turn.angles])
+    angles, size = turn.angles[size > 0], size[size > 0]
+    axes, by = angles / size[:, None], size[:, None, None] / scales[:, None]
+    steps = zip(axes, cross_matrix(axes), np.cos(by), np.sin(by), strict=True)
+    for axis, cross, cos, sin in steps:
         along = (u @ axis)[:, None] * axis
-        across = u @ cross_matrix(axis)  # u x axis, rows
-        # (1): the force turns against the device
-        u = along + (u - along) * np.cos(by) + across * np.sin(by)
+        # (1): the force turns against the device; u @ cross is u x axis, rows
+        u = along + (u - along) * cos + (u @ cross) * sin
     missed: Array = np.arccos(np.clip(u @ turn.behind, -1, 1))
     return missed

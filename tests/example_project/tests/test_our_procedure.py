@@ -19,6 +19,15 @@ def test_their_five_positions_over_mavlink(virtual_imu):
     device.assert_calibration(device.recalibrate("five_position", seconds=8.0))
 
 
+def test_two_positions_over_mavlink_take_a_tilted_base_for_a_bias(virtual_imu):
+    device = virtual_imu("mavlink", effects=["base_tilt:about_x_deg=1"])
+    found = device.recalibrate("two_position", seconds=4.0)
+    with pytest.raises(pytest.fail.Exception, match="acc_bias.z"):
+        device.assert_calibration(found)
+    value, sigma = found.vector("gyr_bias")
+    device.assert_calibration({"gyr_bias": {"value": value, "sigma": sigma}})
+
+
 def test_a_wrong_procedure_is_caught(virtual_imu):
     device = virtual_imu("serial", speed=SPEED, gravity=GRAVITY)
     found = recalibrate(device.url, lambda alpha, beta: device.turn(-alpha, beta))

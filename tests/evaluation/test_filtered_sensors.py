@@ -8,11 +8,12 @@ import pytest
 from session_folders import places, recorded, write_session
 
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.solution import PreparedSession
 from fieldcal.model import priors
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import parse
+from fieldcal.solve import solve
 
 FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
 DEVICE = Profile(
@@ -38,7 +39,8 @@ def test_scale_factors_of_gyroscopes_are_right_behind_a_filter_of_100_ms(
     positions = places(FACES, 20.0, 6.0)
     block = recorded(DEVICE, positions, seed=1)
     session = Session.open(write_session(tmp_path / "faces", block, positions))
-    found = solve_session(session, usable_windows(session))
+    laid = PreparedSession(session, usable_windows(session))
+    found = solve(laid.observations, recorded=laid.recorded_rows(True))
     good = []
     for axis, true in zip("xyz", DEVICE.truth.gyr_scale, strict=True):
         name = f"gyr_scale.{axis}"

@@ -31,10 +31,10 @@ def last_off_by(off: float, folder: Path) -> Path:
     """A session of a perfect device, of which only the rests were recorded."""
     rng, n = np.random.default_rng(0), int(RATE * SECONDS)
     blocks, tables = [], []
-    for i, (alpha, beta) in enumerate(PLACES):
+    for i, (alpha, beta) in enumerate(PLACES[2:]):
         start = i * (SECONDS + PAUSE)
         t = start + np.arange(n) / RATE
-        held = force(alpha + off * (i == len(PLACES) - 1), beta)
+        held = force(alpha + off * (i == len(PLACES) - 3), beta)
         acc = held + rng.normal(0.0, 0.005, (n, 3))
         blocks.append((t, acc, GYR_BIAS + rng.normal(0.0, 0.001, (n, 3))))
         span = {"start_s": start + 1.0, "end_s": start + SECONDS - 0.5}

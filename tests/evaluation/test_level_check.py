@@ -49,7 +49,7 @@ def test_a_base_that_is_not_as_level_as_stated_is_no_go(
     tilt_deg: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     tilt = parse(f"base_tilt:about_x_deg={tilt_deg}")
-    held = places(NINE)
+    held = places(NINE[:5], 10.0)
     site = {**SITE, "level_deg": 0.01, "angle_setting_deg": 0.01}
     run = {"procedure": "positions"}
     block = recorded(Profile().having(tilt), held)

@@ -14,8 +14,8 @@ from fieldcal.cli import main
 from fieldcal.core.samples import Block
 from fieldcal.sim_device.profile import Profile
 
-ANGLES = [(0.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
-HELD = places(ANGLES, seconds=6.0, gap=4.0)
+ANGLES = [(0.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0)]
+HELD = places(ANGLES, seconds=5.0, gap=3.0)
 
 
 @pytest.fixture(scope="module")

@@ -101,9 +101,9 @@ def test_positions_may_be_listed_in_any_order(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     touched = replace(
-        COUPLED, effects=(*COUPLED.effects, parse("bump:at_s=70,for_s=3"))
+        COUPLED, effects=(*COUPLED.effects, parse("bump:at_s=54,for_s=2"))
     )
-    six = POSITIONS[:6]
+    six = places(seconds=8.0)[:6]
     block = recorded(touched, six)
     shuffled = [six[i] for i in ORDER_OF_SIX]
     said = []

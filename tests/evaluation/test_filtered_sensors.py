@@ -8,15 +8,15 @@ import pytest
 from session_folders import places, recorded, write_session
 
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import PreparedSession
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.model import priors
 from fieldcal.session.folder import Session
-from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile
+from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile, Sampling
 from fieldcal.sim_device.vocabulary import parse
-from fieldcal.solve import solve
 
 FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
 DEVICE = Profile(
+    sampling=Sampling(50.0),
     noise=NoiseFigures(
         acc=(3e-3,) * 3, gyr=(3e-4,) * 3, acc_instability=ZERO, gyr_instability=ZERO
     ),
@@ -36,11 +36,10 @@ def test_scale_factors_of_gyroscopes_are_right_behind_a_filter_of_100_ms(
 ) -> None:
     """Of sensors that are taken to be quick, one is wrong or not known any more."""
     monkeypatch.setattr(priors, "FILTERED_S", known_s)
-    positions = places(FACES, 20.0, 6.0)
+    positions = places(FACES, 10.0, 4.0)
     block = recorded(DEVICE, positions, seed=1)
     session = Session.open(write_session(tmp_path / "faces", block, positions))
-    laid = PreparedSession(session, usable_windows(session))
-    found = solve(laid.observations, recorded=laid.recorded_rows(True))
+    found = solve_session(session, usable_windows(session))
     good = []
     for axis, true in zip("xyz", DEVICE.truth.gyr_scale, strict=True):
         name = f"gyr_scale.{axis}"

@@ -14,7 +14,7 @@ from fieldcal.cli import main
 from fieldcal.core.samples import Block
 
 PLACES = [(0, 0), (45, 5), (-45, 5), (-45, -5), (45, -5), (0, 5), (22.5, -5), (45, 5)]
-RATE, SECONDS, PAUSE = 100.0, 30.0, 1.0
+RATE, SECONDS, PAUSE = 25.0, 30.0, 1.0
 GYR_BIAS = np.array([0.01, 0.02, -0.01])
 
 

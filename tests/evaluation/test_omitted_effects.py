@@ -22,6 +22,9 @@ from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import checked_effect
 from fieldcal.solve import solve
 
+UNEXAMINED = {"model": {"effects": ["nonsense"]}}
+"""Of a session whose samples are not examined the means alone are solved."""
+
 
 def device(*effects: Any) -> Profile:
     """A device with nothing but some effects."""
@@ -30,11 +33,11 @@ def device(*effects: Any) -> Profile:
 
 def solved(
     profile: Profile, folder: Path, capsys: pytest.CaptureFixture[str], *options: str,
-    angles: Sequence[tuple[float, float]] = WIDE,
+    angles: Sequence[tuple[float, float]] = WIDE, **tables: Any,
 ) -> tuple[int, dict[str, Any]]:  # fmt: skip
     """Exit code and result.json of a session in some positions."""
     held = places(angles)
-    write_session(folder, recorded(profile, held), held)
+    write_session(folder, recorded(profile, held), held, **tables)
     code = main(["solve", str(folder), "--json", *options])
     out: dict[str, Any] = json.loads(capsys.readouterr().out)
     return code, out
@@ -52,12 +55,15 @@ def off(said: dict[str, Any], profile: Profile) -> np.ndarray[Any, np.dtype[Any]
     )
 
 
+@pytest.mark.parametrize(
+    "tables", [UNEXAMINED, pytest.param({}, marks=pytest.mark.thorough)]
+)
 def test_wrongly_decoded_bytes_are_put_right(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tables: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fault = checked_effect("decode_fault", {"channel": "ay", "kind": "low_byte_signed"})
     profile = device(fault)
-    code, said = solved(profile, tmp_path / "s", capsys, angles=FACES)
+    code, said = solved(profile, tmp_path / "s", capsys, **tables)
     assert code == 0 and said["verdict"] == "good"
     assert np.abs(off(said, profile)).max() < 4.5
     assert any("bytes were decoded wrongly" in w for w in said["warnings"])

@@ -58,7 +58,7 @@ def by_rows(session: Session) -> Calibration:
     ("spins", "estimate", "most"),
     [
         (9, by_means, 1.25),
-        (6, by_rows, 1.6),
+        pytest.param(6, by_rows, 1.6, marks=pytest.mark.thorough),
         pytest.param(6, by_means, 1.25, marks=pytest.mark.thorough),
         pytest.param(9, by_rows, 1.6, marks=pytest.mark.thorough),
     ],

@@ -14,7 +14,7 @@ from fieldcal.cli import main
 from fieldcal.core.samples import Block
 
 PLACES = [(0, 0), (45, 5), (-45, 5), (-45, -5), (45, -5), (0, 5), (22.5, -5), (45, 5)]
-RATE, SECONDS, PAUSE = 25.0, 30.0, 1.0
+RATE, SECONDS, PAUSE = 100.0, 30.0, 1.0
 GYR_BIAS = np.array([0.01, 0.02, -0.01])
 
 
@@ -31,10 +31,10 @@ def last_off_by(off: float, folder: Path) -> Path:
     """A session of a perfect device, of which only the rests were recorded."""
     rng, n = np.random.default_rng(0), int(RATE * SECONDS)
     blocks, tables = [], []
-    for i, (alpha, beta) in enumerate(PLACES[2:]):
+    for i, (alpha, beta) in enumerate(PLACES):
         start = i * (SECONDS + PAUSE)
         t = start + np.arange(n) / RATE
-        held = force(alpha + off * (i == len(PLACES) - 3), beta)
+        held = force(alpha + off * (i == len(PLACES) - 1), beta)
         acc = held + rng.normal(0.0, 0.005, (n, 3))
         blocks.append((t, acc, GYR_BIAS + rng.normal(0.0, 0.001, (n, 3))))
         span = {"start_s": start + 1.0, "end_s": start + SECONDS - 0.5}
@@ -45,10 +45,8 @@ def last_off_by(off: float, folder: Path) -> Path:
     return write_session(folder, Block.of(t, acc, gyr), tables, site=site)
 
 
-@pytest.mark.parametrize(
-    "off",
-    [0.6, *(pytest.param(o, marks=pytest.mark.thorough) for o in (-0.6, 0.5, 1.0))],
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("off", [0.6, -0.6, 0.5, 1.0])
 def test_no_number_is_wrong(
     off: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -108,8 +108,12 @@ def test_biases_and_scale_factors_under_way(tmp_path: Path, explained: bool) -> 
         found = solve_session(one, usable_windows(one))
     else:
         laid = PreparedSession(one, usable_windows(one))
-        known = {"angle_sigma_deg": 1e-4, "level_sigma_deg": 1e-4}
-        found = solve(laid.observations, recorded=laid.recorded_rows(True), **known)
+        found = solve(
+            laid.observations,
+            recorded=laid.recorded_rows(True),
+            angle_sigma_deg=1e-4,
+            level_sigma_deg=1e-4,
+        )
     truth = dict.fromkeys((f"acc_scale.{x}" for x in "xyz"), 1.0)
     truth |= dict(
         zip((f"acc_bias.{x}" for x in "xyz"), (2e-3, 1e-3, -2e-3), strict=True)

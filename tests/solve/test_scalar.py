@@ -77,7 +77,7 @@ def norms(x: Array, u: Array) -> Array:
     """Lengths of the force by (9,) parameters, (n,)."""
     matrix = np.diag(x[3:6])
     matrix[np.triu_indices(3, 1)] = x[6:]
-    return np.linalg.norm(np.linalg.solve(matrix, (u - x[:3]).T), axis=0)
+    return np.asarray(np.linalg.norm(np.linalg.solve(matrix, (u - x[:3]).T), axis=0))
 
 
 def test_uncertainties_are_those_of_least_squares_of_the_norms() -> None:

@@ -27,17 +27,16 @@ from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.set_at_instability import with_typical_calibration
 
-ODDS = 1.0
+ODDS = 0.5
 """Of a cause, for which the chance of one stands where chances are small."""
 
 DRAWS, FEW = 220, 72
 ALL = pytest.param(DRAWS, marks=pytest.mark.thorough)
-"""Sessions. In a few, two that nobody has among what is said with 0.98 to 1 would show,
-and noise alone that is said to be 0.2 and is so in 0.6 of them.
-"""
+"""Sessions. In a few, two that nobody has among what is said with 0.98 to 1 show."""
 
 KEYS = (
     "angle_offset",
+    "quadratic",
     "g_sensitivity",
     "bias_drift:acc",
     "temperature_bias:gyr",
@@ -68,7 +67,8 @@ class Draw:
 
     @cached_property
     def best(self) -> Set:
-        """The set that is found."""
+        """The set that is found, where the true one was visited before."""
+        _ = self.found
         return self.search.run()
 
     @cached_property
@@ -164,10 +164,10 @@ def test_what_is_said_is_true_as_often_as_is_said(
     assert told.pvalue > 0.01, (so[some].mean(), mean, some.sum())
 
 
-@pytest.mark.parametrize("count", [FEW, ALL])
-def test_that_nothing_is_there_is_as_unlikely_as_is_said(count: int) -> None:
+@pytest.mark.thorough
+def test_that_nothing_is_there_is_as_unlikely_as_is_said() -> None:
     """Above one half it is that nothing shows: what is too small may be there."""
-    every = [(one.posterior, not one.true) for one in draws()[:count]]
+    every = [(one.posterior, not one.true) for one in draws()]
     for low, high in ((0.0, 0.01), (0.01, 0.6)):
         some = [
             (p.probability_of_noise_alone, so)

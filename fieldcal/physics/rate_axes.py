@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.core.rotation import rotation_matrices
+from fieldcal.core.rotation import cross, rotation_matrices
 from fieldcal.core.samples import Array
 
 MIN_TURNS = 3
@@ -92,7 +92,7 @@ def _closure_angles(turn: ObservedTurn, every: Sequence[Array]) -> list[float]:
         sign = float(np.sign(np.linalg.det(axes)))
         proper = sign * axes
         led = proper @ ways[sign] @ proper.T @ turn.before  # (2)
-        sine = float(np.linalg.norm(np.cross(led, turn.behind)))
+        sine = float(np.linalg.norm(cross(led, turn.behind)))
         out.append(float(np.arctan2(sine, led @ turn.behind)))
     return out
 

@@ -16,13 +16,14 @@ from fieldcal.core import base_motion
 from fieldcal.core.base_motion import BaseMotion
 from fieldcal.diagnosis import diagnose
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.solution import PreparedSession, solve_session
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import earth
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse
+from fieldcal.solve import solve
 
 SITE = {"latitude_deg": 55.0, "height_m": 20.0, "north_m_s": 60.0, "east_m_s": -90.0}
 FACES = ((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
@@ -98,9 +99,21 @@ def session(folder: Path, **said: Any) -> Session:
     return Session.open(folder)
 
 
-def test_biases_and_scale_factors_under_way(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "explained", [False, pytest.param(True, marks=pytest.mark.thorough)]
+)
+def test_biases_and_scale_factors_under_way(tmp_path: Path, explained: bool) -> None:
     one = session(tmp_path)
-    found = solve_session(one, usable_windows(one))
+    if explained:
+        found = solve_session(one, usable_windows(one))
+    else:
+        laid = PreparedSession(one, usable_windows(one))
+        found = solve(
+            laid.observations,
+            recorded=laid.recorded_rows(True),
+            angle_sigma_deg=1e-4,
+            level_sigma_deg=1e-4,
+        )
     truth = dict.fromkeys((f"acc_scale.{x}" for x in "xyz"), 1.0)
     truth |= dict(
         zip((f"acc_bias.{x}" for x in "xyz"), (2e-3, 1e-3, -2e-3), strict=True)

@@ -30,7 +30,7 @@ values = st.recursive(
 )
 
 
-@given(st.dictionaries(st.from_regex(r"[a-z]+", fullmatch=True), st.integers()))
+@given(st.dictionaries(st.text("abcdefgh", min_size=1), st.integers()))
 def test_a_byte_order_mark_changes_nothing(table: dict[str, int]) -> None:
     toml = "".join(f"{key} = {value}\n" for key, value in table.items())
     text = json.dumps(table)

@@ -6,9 +6,20 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from fieldcal.core.rotation import cross_matrix, rotation_matrices, rotation_vectors
+from fieldcal.core.rotation import (
+    cross,
+    cross_matrix,
+    rotation_matrices,
+    rotation_vectors,
+)
 
 VECTORS = np.random.default_rng(3).standard_normal((2, 4, 3))
+
+
+def test_cross_products_are_those_of_numpy_to_the_last_digit() -> None:
+    one, row = VECTORS[0, 0], VECTORS[0]
+    for a, b in ((VECTORS, VECTORS[::-1]), (one, row), (VECTORS, one), (one, one)):
+        np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
 
 
 def test_the_cross_matrix_is_the_cross_product() -> None:

@@ -87,9 +87,9 @@ def bumps_while_shaken(seed: int, push: float) -> list[float]:
 
 
 def test_the_long_tail_of_a_rectified_vibration_is_no_bump() -> None:
-    said = [bumps_while_shaken(seed, push=0.0) for seed in range(20)]
+    said = [bumps_while_shaken(seed, push=0.0) for seed in range(8)]
     assert not any(said)
-    for seed in range(4):
+    for seed in range(2):
         (at,) = bumps_while_shaken(seed, push=60.0)
         assert abs(at - 64.0) < 0.5
 
@@ -126,7 +126,7 @@ def pushed(
 @pytest.mark.parametrize("lasts", [6.0, 20.0, 300.0])
 def test_a_push_of_a_second_is_found_however_long_the_window_is(lasts: float) -> None:
     """It bends the course of a short window, and is much of what is near it."""
-    for seed in range(5):
+    for seed in range(2 if lasts > 100 else 5):
         ((start, end),) = pushed(seed, lasts, "there and back", 3.5)
         assert 32.9 < start < 33.4 and 33.6 < end < 34.1
 
@@ -181,7 +181,7 @@ def test_a_channel_that_says_nothing_is_not_pushed(value: float) -> None:
     missing=st.sampled_from([0.0, 0.1]),
     silent=st.sampled_from([None, 0.0, 1.0, np.nan]),
 )
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=15, deadline=None, derandomize=True)
 def test_however_short_a_window_is_and_whatever_is_in_it_nothing_breaks(
     seed: int,
     hz: float,

@@ -11,11 +11,12 @@ from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
 from fieldcal.model import priors
 from fieldcal.session.folder import Session
-from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile
+from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile, Sampling
 from fieldcal.sim_device.vocabulary import parse
 
 FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
 DEVICE = Profile(
+    sampling=Sampling(50.0),
     noise=NoiseFigures(
         acc=(3e-3,) * 3, gyr=(3e-4,) * 3, acc_instability=ZERO, gyr_instability=ZERO
     ),
@@ -35,7 +36,7 @@ def test_scale_factors_of_gyroscopes_are_right_behind_a_filter_of_100_ms(
 ) -> None:
     """Of sensors that are taken to be quick, one is wrong or not known any more."""
     monkeypatch.setattr(priors, "FILTERED_S", known_s)
-    positions = places(FACES, 20.0, 6.0)
+    positions = places(FACES, 10.0, 4.0)
     block = recorded(DEVICE, positions, seed=1)
     session = Session.open(write_session(tmp_path / "faces", block, positions))
     found = solve_session(session, usable_windows(session))

@@ -19,6 +19,9 @@ from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse
 from fieldcal.solve import solve
 
+UNEXAMINED = {"model": {"effects": ["nonsense"]}}
+"""Of a session whose samples are not examined the means alone show the tilt."""
+
 PLACES = tuple(Position.deg(a, b) for a, b in NINE[:6])
 
 
@@ -43,17 +46,25 @@ def test_of_a_true_statement_it_is_that_of_two_degrees_of_freedom() -> None:
 
 
 @pytest.mark.parametrize(
-    "tilt_deg", [pytest.param(0.0, marks=pytest.mark.thorough), 0.5]
+    ("tilt_deg", "tables"),
+    [
+        (0.5, UNEXAMINED),
+        pytest.param(0.0, {}, marks=pytest.mark.thorough),
+        pytest.param(0.5, {}, marks=pytest.mark.thorough),
+    ],
 )
 def test_a_base_that_is_not_as_level_as_stated_is_no_go(
-    tilt_deg: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tilt_deg: float,
+    tables: dict[str, Any],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     tilt = parse(f"base_tilt:about_x_deg={tilt_deg}")
     held = places(NINE)
     site = {**SITE, "level_deg": 0.01, "angle_setting_deg": 0.01}
     run = {"procedure": "positions"}
     block = recorded(Profile().having(tilt), held)
-    folder = write_session(tmp_path / "s", block, held, site=site, run=run)
+    folder = write_session(tmp_path / "s", block, held, site=site, run=run, **tables)
     main(["solve", str(folder), "--json"])
     checks = json.loads(capsys.readouterr().out)["decision"]["checks"]
     (level,) = [check for check in checks if check["name"] == "level"]

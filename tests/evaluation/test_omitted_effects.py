@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,9 @@ from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import checked_effect
 from fieldcal.solve import solve
 
+UNEXAMINED = {"model": {"effects": ["nonsense"]}}
+"""Of a session whose samples are not examined the means alone are solved."""
+
 
 def device(*effects: Any) -> Profile:
     """A device with nothing but some effects."""
@@ -28,11 +32,12 @@ def device(*effects: Any) -> Profile:
 
 
 def solved(
-    profile: Profile, folder: Path, capsys: pytest.CaptureFixture[str], *options: str
-) -> tuple[int, dict[str, Any]]:
-    """Exit code and result.json of a session in ten positions."""
-    held = places(WIDE)
-    write_session(folder, recorded(profile, held), held)
+    profile: Profile, folder: Path, capsys: pytest.CaptureFixture[str], *options: str,
+    angles: Sequence[tuple[float, float]] = WIDE, **tables: Any,
+) -> tuple[int, dict[str, Any]]:  # fmt: skip
+    """Exit code and result.json of a session in some positions."""
+    held = places(angles)
+    write_session(folder, recorded(profile, held), held, **tables)
     code = main(["solve", str(folder), "--json", *options])
     out: dict[str, Any] = json.loads(capsys.readouterr().out)
     return code, out
@@ -50,12 +55,15 @@ def off(said: dict[str, Any], profile: Profile) -> np.ndarray[Any, np.dtype[Any]
     )
 
 
+@pytest.mark.parametrize(
+    "tables", [UNEXAMINED, pytest.param({}, marks=pytest.mark.thorough)]
+)
 def test_wrongly_decoded_bytes_are_put_right(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tables: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fault = checked_effect("decode_fault", {"channel": "ay", "kind": "low_byte_signed"})
     profile = device(fault)
-    code, said = solved(profile, tmp_path / "s", capsys)
+    code, said = solved(profile, tmp_path / "s", capsys, **tables)
     assert code == 0 and said["verdict"] == "good"
     assert np.abs(off(said, profile)).max() < 4.5
     assert any("bytes were decoded wrongly" in w for w in said["warnings"])
@@ -73,11 +81,18 @@ def test_bytes_are_put_right_for_a_method_that_is_asked_for(
 
 
 @pytest.mark.parametrize(
-    ("size", "ignored"),
-    [(1e-4, 5.0), pytest.param(-3e-5, 1.0, marks=pytest.mark.thorough)],
+    ("size", "ignored", "angles"),
+    [
+        (1e-4, 5.0, WIDE[:7]),
+        pytest.param(-3e-5, 1.0, WIDE, marks=pytest.mark.thorough),
+    ],
 )
 def test_a_drift_is_in_the_result(
-    size: float, ignored: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    size: float,
+    ignored: float,
+    angles: list[tuple[float, float]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """The bias is that at the end, and what the drift moves is said.
 
@@ -85,7 +100,7 @@ def test_a_drift_is_in_the_result(
     large as was found, and no smaller because it is less certain.
     """
     profile = device(checked_effect("bias_drift", {"ax": size}))
-    code, said = solved(profile, tmp_path / "s", capsys)
+    code, said = solved(profile, tmp_path / "s", capsys, angles=angles)
     assert code == 0 and said["verdict"] == "good"
     assert "not_carried" not in said
     there = said["carried"]

@@ -15,7 +15,7 @@ LADDER = [(0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (0.0, 5.0), (0.0, -5.0)]
 
 def test_a_wrong_angle_is_one_of_the_position_that_is_meant(tmp_path: Path) -> None:
     """Positions are listed backwards, after one that was never held."""
-    held = places(LADDER, seconds=10.0)
+    held = places(LADDER, seconds=5.0)
     listed = [{"alpha_deg": 20.0, "beta_deg": 2.0}, *held[::-1]]
     block = recorded(CALM, held)
     session = Session.open(write_session(tmp_path / "s", block, listed))

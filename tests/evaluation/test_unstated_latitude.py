@@ -53,14 +53,22 @@ def calibrated(
     return solve(build_observations(about, seen), angle_sigma_deg=0.001)
 
 
-@pytest.mark.parametrize("positions", [TWO, LEANING], ids=["two", "leaning"])
+@pytest.mark.parametrize(
+    ("positions", "count"),
+    [
+        pytest.param(TWO, 15, id="two"),
+        pytest.param(LEANING, 8, id="leaning"),
+        pytest.param(TWO, 40, marks=pytest.mark.thorough, id="two, often"),
+        pytest.param(LEANING, 40, marks=pytest.mark.thorough, id="leaning, often"),
+    ],
+)
 def test_biases_are_as_uncertain_as_the_place_is(
-    positions: list[tuple[float, float]],
+    positions: list[tuple[float, float]], count: int
 ) -> None:
     """On places spread evenly over the Earth, with gyroscopes that would show it."""
     rng = np.random.default_rng(5)
     square = []
-    for seed in range(40):
+    for seed in range(count):
         latitude = float(np.rad2deg(np.arcsin(rng.uniform(-1, 1))))
         bias = rng.normal(0, 1e-3, 3)
         found = calibrated(positions, latitude, bias, seed)

@@ -19,7 +19,7 @@ from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile
 
 MG, MRAD = 9.80665e-3, 1e-3
 SILENT = NoiseFigures(ZERO, ZERO, acc_instability=ZERO, gyr_instability=ZERO)
-WHERE = places(NINE[:6], seconds=12.0)
+WHERE = places(NINE[:4], seconds=8.0)
 
 
 def coarse(turns: bool = True) -> Block:

@@ -15,8 +15,10 @@ def noise(seed: int, n: int = 3000) -> Array:
     return np.random.default_rng(seed).standard_normal((n, 6))
 
 
-def test_noise_is_pushed_in_less_than_one_window_of_a_hundred() -> None:
-    assert sum(len(disturbed_stretches(noise(seed), M)) > 0 for seed in range(300)) <= 3
+@pytest.mark.parametrize("count", [100, pytest.param(300, marks=pytest.mark.thorough)])
+def test_noise_is_pushed_in_less_than_one_window_of_a_hundred(count: int) -> None:
+    pushed = [len(disturbed_stretches(noise(seed), M)) > 0 for seed in range(count)]
+    assert sum(pushed) <= count / 100
 
 
 @pytest.mark.parametrize("n", [800, 3000])

@@ -105,7 +105,7 @@ def test_covariance_is_that_of_the_windows_carried_through() -> None:
     half = rng.standard_normal((2, 3, 3))
     cov = 1e-6 * (half @ half.transpose(0, 2, 1) + np.eye(3))
     drawn = []
-    for _ in range(1500):
+    for _ in range(500):
         noise = (np.linalg.cholesky(cov) @ rng.standard_normal((2, 3, 1)))[..., 0]
         seen = observe(TWO_POSITIONS, truth + noise)
         seen.covariance[:, :3, :3] = cov
@@ -257,7 +257,7 @@ def test_five_positions_scatter_as_stated() -> None:
     u = outputs(SPREAD_OUT, offset_deg=OFFSET)
     truth = [*BIAS, *SCALE, *OFFSET]
     pulls = []
-    for _ in range(600):
+    for _ in range(250):
         noise = 1e-3 * rng.standard_normal(u.shape)
         found = five_position(observe(SPREAD_OUT, u + noise))
         pulls.append((found.values - truth) / np.sqrt(np.diag(found.covariance)))

@@ -51,13 +51,18 @@ def held(
 
 
 @pytest.mark.parametrize(
-    "recorded", [False, pytest.param(True, marks=pytest.mark.thorough)]
+    ("recorded", "seeds"),
+    [
+        (False, 2),
+        pytest.param(False, 6, marks=pytest.mark.thorough),
+        pytest.param(True, 3, marks=pytest.mark.thorough),
+    ],
 )
 def test_the_length_of_the_earths_rate_gives_the_bias(
-    tmp_path: Path, recorded: bool
+    tmp_path: Path, recorded: bool, seeds: int
 ) -> None:
     every = []
-    for seed in range(3 if recorded else 6):
+    for seed in range(seeds):
         session = held(tmp_path / str(seed), seed)
         if recorded:
             found = solve_session(

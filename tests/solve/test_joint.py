@@ -108,7 +108,8 @@ CASES = [
     pytest.param(Model("angle_offset"), FIVE_POSITIONS, 40, marks=pytest.mark.thorough),
     pytest.param(Model("angle_offset"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
     pytest.param(Model("base_tilt"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
-    (Model("base_tilt"), NINE, 25),
+    (Model("base_tilt"), NINE, 12),
+    pytest.param(Model("base_tilt"), NINE, 25, marks=pytest.mark.thorough),
     pytest.param(Model(cross=True), SIX_FACES, 50, marks=pytest.mark.thorough),
 ]
 
@@ -153,7 +154,7 @@ def bumped(size: float) -> Disturb:
         [
             (some, size)
             for size in (3.0, 5.0, 10.0, 100.0, 3000.0)
-            for some in (SIX, NINE)
+            for some in (NINE, SIX)
         ],
     ),
 )
@@ -187,14 +188,15 @@ def test_good_positions_are_not_doubted() -> None:
     assert np.median(doubt.max(axis=1)) < 0.1
 
 
-def test_three_positions_cannot_say_which_one_is_bad() -> None:
+@pytest.mark.parametrize("count", [15, pytest.param(45, marks=pytest.mark.thorough)])
+def test_three_positions_cannot_say_which_one_is_bad(count: int) -> None:
     places = (Position.deg(0, 0), Position.deg(40, 5), Position.deg(-40, -5))
-    found, _ = run(Model(), places, 45, 4, bumped(30.0))
+    found, _ = run(Model(), places, count, 4, bumped(30.0))
     doubt = np.array([f.info["bad_position"] for f in found])
     assert (doubt.max(axis=1) > 0.99).mean() < 0.05
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(st.sampled_from(MOUNTINGS), st.sampled_from(["angle_offset", "base_tilt"]))
 def test_any_mounting(mounting: Array, tilt: Tilt) -> None:
     u = outputs(SPREAD_OUT, mounting=mounting, **TILTED[tilt])  # type: ignore[arg-type]
@@ -210,10 +212,13 @@ def test_auto_takes_the_model_of_the_tilt_that_fits() -> None:
         assert any(f"{name} fits worse" in w for w in result.warnings)
 
 
-def test_where_the_models_of_the_tilt_cannot_be_told_apart_both_are_covered() -> None:
+@pytest.mark.parametrize("count", [10, pytest.param(24, marks=pytest.mark.thorough)])
+def test_where_the_models_of_the_tilt_cannot_be_told_apart_both_are_covered(
+    count: int,
+) -> None:
     rng = np.random.default_rng(7)
     pulls = []
-    for k in range(24):
+    for k in range(count):
         small = (0.05 * rng.standard_normal(2)).tolist()
         tilt = {"base_deg": small} if k % 2 else {"offset_deg": small}
         u = outputs(FIVE_POSITIONS, **tilt)
@@ -344,11 +349,14 @@ def by_hand(rng: np.random.Generator, n: int) -> Array:
     return np.asarray(BIAS + SCALE * f)
 
 
-def test_positions_without_angles_among_others_are_used_by_their_length() -> None:
+@pytest.mark.parametrize("count", [2, pytest.param(18, marks=pytest.mark.thorough)])
+def test_positions_without_angles_among_others_are_used_by_their_length(
+    count: int,
+) -> None:
     rng = np.random.default_rng(21)
     places = (*FIVE_POSITIONS, *[Position("somewhere")] * 4)
     found, error, narrower = [], [], []
-    for _ in range(18):
+    for _ in range(count):
         u = np.vstack([outputs(FIVE_POSITIONS), by_hand(rng, 4)])
         u += SIGMA * rng.standard_normal(u.shape)
         found.append(solve(observe(places, u), tilt="none"))
@@ -356,9 +364,10 @@ def test_positions_without_angles_among_others_are_used_by_their_length() -> Non
         known = solve(observe(FIVE_POSITIONS, u[:5]), tilt="none")
         narrower.append(found[-1].sigma / known.sigma)
     assert found[0].method == "joint" and found[0].dof == 3 * 5 + 4 - 6
-    assert 0.88 < whitened(found, np.array(error)).std() < 1.08
-    chi2 = np.mean([f.chi2 for f in found]) / found[0].dof
-    assert chi2 == pytest.approx(1, abs=0.15)
+    if count > 2:
+        assert 0.88 < whitened(found, np.array(error)).std() < 1.08
+        chi2 = np.mean([f.chi2 for f in found]) / found[0].dof
+        assert chi2 == pytest.approx(1, abs=0.15)
     # z is hardly loaded on a small ladder
     assert (np.median(narrower, axis=0) < 1.0).all()
     assert np.median(narrower, axis=0)[5] < 0.2

@@ -77,12 +77,19 @@ def solved(session: Session) -> Calibration:
     return solve(seen)
 
 
-@pytest.mark.parametrize("rests", [pytest.param(0, marks=pytest.mark.thorough), 3])
+@pytest.mark.parametrize(
+    ("rests", "seeds"),
+    [
+        pytest.param(0, 3, marks=pytest.mark.thorough),
+        (3, 1),
+        pytest.param(3, 3, marks=pytest.mark.thorough),
+    ],
+)
 def test_the_length_of_a_rate_gives_bias_and_scale_factor(
-    tmp_path: Path, rests: int
+    tmp_path: Path, rests: int, seeds: int
 ) -> None:
     every = []
-    for seed in range(3):
+    for seed in range(seeds):
         found = solved(turned(tmp_path / str(seed), seed, rests=rests))
         assert found.vector("gyr_scale")[1].max() < 2e-3
         every.append(pulls(found))
@@ -94,12 +101,13 @@ def test_the_length_of_a_rate_gives_bias_and_scale_factor(
     assert np.abs(every).max() < 4
 
 
-def test_a_bias_as_large_as_the_rate_bends_nothing(tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [1, pytest.param(4, marks=pytest.mark.thorough)])
+def test_a_bias_as_large_as_the_rate_bends_nothing(tmp_path: Path, count: int) -> None:
     """What is read points far from the axis at first."""
     bias = np.array([0.05, -0.08, 0.03])
     every = [
         pulls(solved(turned(tmp_path / str(s), s, speed=5.0, bias=bias)), bias)
-        for s in range(4)
+        for s in range(count)
     ]
     assert np.abs(every).max() < 4
 
@@ -138,7 +146,7 @@ def test_a_table_with_nothing_wrong_is_diagnosed_as_that(
 def test_the_command_and_the_report(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    turned(tmp_path, 3)
+    turned(tmp_path, 3, spins=7, rests=2)
     assert main(["solve", str(tmp_path)]) in (0, 1)
     assert "gyro scale factor x" in capsys.readouterr().out
     assert main(["report", str(tmp_path)]) == 0

@@ -61,12 +61,15 @@ def navigation(
     ("places", "tilt"),
     one_in(4, [(places, tilt) for places in (FIVE_POSITIONS, NINE) for tilt in TILTS]),
 )
+@pytest.mark.parametrize(
+    ("seed", "count"), [(4, 18), pytest.param(3, 40, marks=pytest.mark.thorough)]
+)
 def test_navigation_gyroscopes_on_a_tilted_base(
-    places: Sequence[Position], tilt: str
+    places: Sequence[Position], tilt: str, seed: int, count: int
 ) -> None:
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(seed)
     pulls, chi2 = [], []
-    for _ in range(25 if len(places) > 5 else 40):
+    for _ in range(25 if len(places) > 5 else count):
         found = solve(navigation(rng, places, tilt), tilt=tilt)  # type: ignore[arg-type]
         bias, bias_sigma = found.vector("gyr_bias")
         scale, scale_sigma = found.vector("gyr_scale")
@@ -80,11 +83,16 @@ def test_navigation_gyroscopes_on_a_tilted_base(
     assert np.mean(chi2) == pytest.approx(1, abs=0.1)
 
 
-def test_a_base_known_to_be_nearly_level_is_in_the_gyroscopes_uncertainty() -> None:
-    rng = np.random.default_rng(7)
+@pytest.mark.parametrize(
+    ("seed", "count"), [(10, 15), pytest.param(7, 60, marks=pytest.mark.thorough)]
+)
+def test_a_base_known_to_be_nearly_level_is_in_the_gyroscopes_uncertainty(
+    seed: int, count: int
+) -> None:
+    rng = np.random.default_rng(seed)
     two = (Position.deg(0, 0), Position.deg(45, 5))
     pulls = []
-    for _ in range(60):
+    for _ in range(count):
         x, z = 0.2 * rng.standard_normal(2)
         gyr = GYR_BIAS + rates(two, "base_tilt", [x, z])
         gyr = gyr + 1e-8 * rng.standard_normal((2, 3))

@@ -452,7 +452,7 @@ def test_compare_and_apply_say_what_is_wrong(
     broken.write_text("{}")
     assert main(["compare", str(broken), str(broken)]) == 2
     assert "format is missing" in capsys.readouterr().err
-    folder = practised("p10").folder
+    folder = practised("p01").folder
     capsys.readouterr()
     assert main(["apply", str(folder), str(tmp_path / "x.xls")]) == 2
     assert ".parquet" in capsys.readouterr().err

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.derivative import derivative
+from fieldcal.core.rotation import cross
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
@@ -167,5 +168,5 @@ def closures(f: Array, held: Array, end: Array) -> tuple[Array, NDArray[np.bool_
     force = f[:, 1] @ end
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     return np.where(
-        whole[:, None], antisymmetric_vector(rotation), np.cross(up, force)
+        whole[:, None], antisymmetric_vector(rotation), cross(up, force)
     ), whole

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.derivative import derivative
-from fieldcal.core.rotation import rotation_matrices
+from fieldcal.core.rotation import cross, rotation_matrices
 from fieldcal.core.samples import Array
 
 
@@ -35,7 +35,7 @@ def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
     total = np.add.reduceat(
         (np.diff(t)[:, None] * mean_rates(t, w))[: edge[-1]], edge[:-1], axis=0
     )
-    coning = np.cross(w[edge[:-1]], w[edge[1:]])
+    coning = cross(w[edge[:-1]], w[edge[1:]])
     turns: Array = total + np.diff(t[edge])[:, None] ** 2 / 12 * coning
     return turns
 

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.derivative import derivative
+from fieldcal.core.rotation import cross
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
@@ -162,7 +163,7 @@ class Turn:
         `phi` (m + 1, 3, k) are attitude errors, rad in device axes at p.
         """
         force = self.ends.f[self.ends.position == self.positions[0]].mean(axis=0)
-        crossed = np.cross(np.moveaxis(phi, 1, 2), force)
+        crossed = cross(np.moveaxis(phi, 1, 2), force)
         out: Array = np.einsum("mij,mkj->mik", self.attitude, crossed)
         return out
 

@@ -165,6 +165,7 @@ def test_on_firm_ground_nothing_leans(seed: int) -> None:
     assert found.posterior.cause_names(found.best.set) == ("temperature_bias",)
 
 
+@pytest.mark.thorough
 def test_what_gyroscopes_would_have_seen_is_no_lean() -> None:
     """Outputs that change by as much as a tilt of 20 mrad, while nothing turns."""
     found = explained(stops(np.random.default_rng(5), 2e-2, firm=True))

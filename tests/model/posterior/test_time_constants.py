@@ -17,7 +17,7 @@ from fieldcal.model.search.inference import Inference, InferenceResult
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.window_rows import WindowSystem
 
-X = ladder(6)
+X = ladder(4)
 TAU, SIZE = 9.0, 3e-3
 
 
@@ -85,7 +85,9 @@ def test_an_amplitude_is_uncertain_by_what_the_time_constant_moves_it() -> None:
 
 def test_what_does_not_fade_is_nowhere_else() -> None:
     d = dictionary(X)
-    y = np.hstack([X.f, X.w]) + SD * np.random.default_rng(1).standard_normal((54, 6))
+    y = np.hstack([X.f, X.w]) + SD * np.random.default_rng(1).standard_normal(
+        (len(X), 6)
+    )
     assert (
         sets_at_other_time_constants(
             Inference(GaussNewton(WindowSystem(rows_of(X, y), d), nominal())).run()

@@ -74,7 +74,7 @@ def test_the_bias_at_rest_is_off_by_the_same_in_all_windows() -> None:
     """Of noise far below a step their mean is no better than one of them."""
     rng, pulls, apart = np.random.default_rng(11), [], []
     windows = (np.arange(0, 2400, 200)[:, None] + [0, 190]).astype(np.intp)
-    for _ in range(60):
+    for _ in range(25):
         bias, noise = rng.uniform(-1, 1, 3), rng.uniform(0.03, 0.08)
         rates = bias + noise * rng.standard_normal((2400, 3))
         on_the_way = np.arange(2400) % 200 > 190

@@ -24,7 +24,7 @@ from fieldcal.model.state import State, Term
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.shape import FINEST
 
-X = ladder(6)
+X = ladder(4)
 EFFECTS = catalogue()
 TAU = 7.3
 BIAS = np.array([0.02, -0.03, 0.01, 1e-3, -2e-3, 5e-4])

@@ -53,7 +53,7 @@ def test_one_proportion_needs_fewer_numbers_than_axes_that_scatter(
     [1e-3, *(pytest.param(s, marks=pytest.mark.thorough) for s in (0.0, 1e-2))],
 )
 def test_axes_that_scatter_each_for_itself_have_no_proportion(scatter: float) -> None:
-    for seed in range(10):
+    for seed in range(5):
         off, rng = noisy(seed)
         each = rng.standard_normal((len(LADDER), 3))[X.position]
         off[:, :3] += scatter * each

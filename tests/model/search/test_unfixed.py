@@ -11,8 +11,8 @@ import pytest
 
 from benchmarks.hand_held.draws import GRAVITY, log
 from fieldcal.cli import main
-from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.prepare import prepare_recording
+from fieldcal.diagnosis.explain import Explanation, build_fit, explain
+from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes
 from fieldcal.model.search.inference import MAX_KEPT_STEP
@@ -23,8 +23,8 @@ SEEDS = (88_000_036, pytest.param(88_000_011, marks=pytest.mark.thorough))
 
 
 @cache
-def explained(seed: int) -> Explanation:
-    """A log as `fieldcal import` makes a session of it, explained."""
+def prepared(seed: int) -> PreparedRecording:
+    """A log as `fieldcal import` makes a session of it."""
     head = "t,ax,ay,az,gx,gy,gz,temp"
     with TemporaryDirectory() as folder:
         file, one = Path(folder) / "log.csv", Path(folder) / "s"
@@ -34,7 +34,13 @@ def explained(seed: int) -> Explanation:
         said = said.replace("[site]", f"[site]\ngravity = {GRAVITY}")
         (one / "session.toml").write_text(said)
         session = Session.open(one)
-        return explain(prepare_recording(session.block, session.about))
+        return prepare_recording(session.block, session.about)
+
+
+@cache
+def explained(seed: int) -> Explanation:
+    """A log, explained."""
+    return explain(prepared(seed))
 
 
 @pytest.mark.thorough
@@ -58,10 +64,14 @@ def test_the_state_stays_where_the_set_does() -> None:
 
 def test_how_a_position_lies_moves_no_closure() -> None:
     """It is read from accelerometers, whatever they couple, bend or are biased by."""
-    inferred = explained(88_000_036).inferred
-    own = inferred.fit
-    own.gram(inferred.state, inferred.values, None)
-    coupled = [t for t in inferred.state.terms if t.effect.id == "cross_coupling"]
+    one = prepared(88_000_045)
+    own = build_fit(one.source, one.rows, one)
+    there = {c.key: c for c in own.dictionary.causes}
+    state, values, _ = own.settle(own.nominal, np.zeros(own.dictionary.width), ())
+    members = tuple((there[key], there[key].variants[0]) for key in sorted(EVERY))
+    state, values, _ = own.settle(state, values, members)
+    own.gram(state, values, None)
+    coupled = [t for t in state.terms if t.effect.id == "cross_coupling"]
     assert np.abs(np.concatenate([t.values for t in coupled])).max() > 4e-3
     lies = np.arange(own.dictionary.width)[own.dictionary.rotations]
     moved = [t.design[:, np.isin(t.columns, lies)] for t in own.turn_rows]

@@ -195,7 +195,7 @@ def test_about_the_true_state_there_is_nothing_left(name: str) -> None:
     ("acc", "gyr"),
     [
         (0.08, 0.08),
-        (0.0, 0.02),
+        pytest.param(0.0, 0.02, marks=pytest.mark.thorough),
         pytest.param(0.03, 0.03, marks=pytest.mark.thorough),
         pytest.param(0.02, 0.0, marks=pytest.mark.thorough),
     ],

@@ -28,10 +28,8 @@ from fieldcal.physics.pushes import (
 )
 from fieldcal.physics.recording import CheckedSamples, Fault, medians
 from fieldcal.physics.shape import Shape
-from fieldcal.physics.steady_changes import (
-    AROUND_S,
-    steady_changes,
-)
+from fieldcal.physics.steady_changes import AROUND_S, steady_changes
+from fieldcal.physics.swings import swings
 
 ROUNDED_HALF_STEPS = 4.02
 """Largest deviation that rounding explains, in half steps of an output."""
@@ -88,7 +86,10 @@ def _gently_pushed_stretches(
             first = max(push.first - around, 0)
             near = z[first : push.last + around]
             at = (push.first - first, push.last - first)
-            courses = steady_changes(near, at, rate / block)
+            courses = [
+                *steady_changes(near, at, rate / block),
+                *swings(near, at, rate / block),
+            ]
             if all(push.is_in(near - course) for course in courses):
                 out[p].append(_gentle_fault(recording, p, push, loud[p], block))
     return out

@@ -156,6 +156,40 @@ def test_a_sway_that_turns_back_at_the_end_of_a_window_is_no_push() -> None:
         assert [f for name, f in checked.faults if name == "bump"] == []
 
 
+def held_by_hand(seed: int, push: float) -> list[float]:
+    """When bumps are said to be, s, in eight windows of 4 s that a hand held.
+
+    In one or two of them it swings slowly. In the fourth a push of `push` standard
+    deviations of a sample lasts from 17.5 to 18.5 s.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(8 * 5 * 50) / 50
+    window = (t // 5).astype(int)
+    rates = rng.normal(0, 1e-3, (len(t), 3))
+    for w in range(8):
+        hz = rng.uniform(0.35, 0.9) if rng.random() < 0.2 and w != 3 else 6.0
+        swing = 2e-3 * np.sin(2 * np.pi * hz * t + rng.uniform(0, 6.28))
+        rates[:, w % 3] += swing * (window == w)
+    rates[:, 1] += 1e-3 * push * np.sin(np.pi * (t - 17.5)) * (abs(t - 18) < 0.5)
+    acc = np.array([0.0, -G, 0.0]) + rng.normal(0, 0.01, (len(t), 3))
+    held = [
+        {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": 5.0 * w, "end_s": 5.0 * w + 4}
+        for w in range(8)
+    ]
+    site = {"gravity": G, "latitude_deg": 50.0}
+    about = parse_description({"format": 1, "site": site, "position": held})
+    checked = check_chain(Block.of(t, acc, rates), about)
+    return [f.from_s for name, f in checked.faults if name == "bump"]
+
+
+def test_a_hand_that_swings_slowly_in_some_windows_is_not_pushed() -> None:
+    """A half period of it is as a push, but so are those before and after."""
+    false = [at for seed in range(12) for at in held_by_hand(seed, 0.0)]
+    assert len(false) <= 1
+    pushed = [held_by_hand(seed, 3.5) for seed in range(12)]
+    assert sum(any(17 < at < 18.5 for at in found) for found in pushed) >= 11
+
+
 @pytest.mark.parametrize("value", [0.0, 1.0, np.nan])
 def test_a_channel_that_says_nothing_is_not_pushed(value: float) -> None:
     """It never changes, or nobody sent it; beside it a push is found."""

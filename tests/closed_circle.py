@@ -1,10 +1,11 @@
 """Which effects of the catalogue go round the closed circle in every run.
 
 Round the circle an effect is put into the virtual device, and named from the recording.
-That takes seconds each, so every run takes one of each mechanism, the same ones each
-time: a test that turns red has been turned red by the change, and not by the day it is
-run on. `--all` takes the whole catalogue. What only a reference shows that follows the
-motion goes round a circle of its own.
+That takes seconds each, so every run takes one in three, the same ones each time: a
+test that turns red has been turned red by the change, and not by the day it is run on.
+They are every third in the order of their kinds, so that each kind is among them.
+`--all` takes the whole catalogue. What only a reference shows that follows the motion
+goes round a circle of its own.
 """
 
 from __future__ import annotations
@@ -15,18 +16,24 @@ from typing import Any
 import pytest
 
 from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Chain, Effect, Line, Motion, Scatter
 from fieldcal.sim_device.effects import kind
 
-IN_EVERY_RUN = (
-    "saturation",  # of the signal chain
-    "hum",  # a line
-    "gravity_error",  # of the motion
-    "angle_setting",  # by chance
-    "gyro_cross_coupling",  # of a sensor, seen in positions and turns
-    "settling",  # after each turn
-)
-"""Of what changes with time, `test_diagnosis_one_axis` conceals a step of a bias, and
-`test_diagnosis_page` one that follows the temperature."""
+KINDS: tuple[type[Effect], ...] = (Chain, Line, Motion, Scatter, Effect)
+"""The last is what all are, and here those that are none of the others."""
+
+ONE_IN = 3
+
+
+def _kind(effect: Effect) -> int:
+    return next(i for i, kind in enumerate(KINDS) if isinstance(effect, kind))
+
+
+def ordered() -> list[str]:
+    """Ids that positions show, by kind, then by what they are seen in."""
+    of = catalogue()
+    some = [id_ for id_ in of if not kind(id_).EXAMPLE.in_motion]
+    return sorted(some, key=lambda id_: (_kind(of[id_]), of[id_].seen_in, id_))
 
 
 def one_in(number: int, cases: Sequence[tuple[Any, ...]]) -> list[Any]:
@@ -38,10 +45,5 @@ def one_in(number: int, cases: Sequence[tuple[Any, ...]]) -> list[Any]:
 
 
 def every_effect() -> list[Any]:
-    """Ids that positions show, of which some are for `--all` alone."""
-    assert set(IN_EVERY_RUN) <= set(catalogue())
-    return [
-        pytest.param(id_, marks=[] if id_ in IN_EVERY_RUN else [pytest.mark.thorough])
-        for id_ in catalogue()
-        if not kind(id_).EXAMPLE.in_motion
-    ]
+    """All ids, of which some are for `--all` alone."""
+    return one_in(ONE_IN, [(id_,) for id_ in ordered()])

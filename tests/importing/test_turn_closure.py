@@ -75,6 +75,37 @@ def test_turns_about_an_elbow_or_into_a_rail_show_no_other_scale(
     assert found == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_what_a_trembling_hand_reads_in_one_short_rest_is_no_bias(seed: int) -> None:
+    """It trembles by half a degree, now more and now less: parts of it are calm."""
+    rows, rng = swung(seed), np.random.default_rng(seed)
+    t = rows[:, 0]
+    for hz in rng.uniform(0.4, 6.0, 4):
+        phase = 2 * np.pi * hz * t + rng.uniform(0, 6.28)
+        now = 0.008 * np.sin(0.7 * t + rng.uniform(0, 6.28, (3, 1))).T
+        angle = now * np.sin(phase)[:, None]
+        rows[:, 1:4] -= np.cross(angle, rows[:, 1:4])
+        rows[:, 1:4] -= 0.06 * (2 * np.pi * hz) ** 2 * angle
+        rows[:, 4:] += now * (2 * np.pi * hz * np.cos(phase))[:, None]
+    found = closing_scale(t, rows[:, 1:4] / G, rows[:, 4:], 1.15)
+    assert found == pytest.approx(1.0, rel=0.03)
+
+
+def test_a_slow_turn_is_no_rest() -> None:
+    """Gravity turns by 10 degrees a second, as calm as it lies."""
+    rows = swung(2)
+    rest = np.flatnonzero(np.linalg.norm(rows[:, 4:], axis=1) < 0.05)
+    goes_on = np.diff(np.concatenate([[0], rest])) == 1
+    assert goes_on.sum() > 1000
+    slow = np.deg2rad(10.0)
+    path = Rotation.from_rotvec(
+        np.outer(np.cumsum(goes_on * slow / RATE), [0.0, 0.6, 0.8])
+    )
+    rows[rest, 1:4] = path.inv().apply(rows[rest, 1:4])
+    rows[rest, 4:] += slow * np.array([0.0, 0.6, 0.8])
+    assert closing_scale(rows[:, 0], rows[:, 1:4] / G, rows[:, 4:], 1.0) is None
+
+
 def test_the_rests_alone_give_it() -> None:
     rows = jerked(4, 15.0)
     found = closing_scale(rows[:, 0], rows[:, 1:4] / G, rows[:, 4:], 1.3)

@@ -29,6 +29,9 @@ NEAR_G = 0.1
 CALM_LIMITS = 0.2, 2.0
 """Calmest part of the groups, and how many times its spread a rest has at most."""
 
+STEADY_RAD = np.deg2rad(2.0)
+"""Turn of gravity from one half of a rest to the other."""
+
 MIN_TURN_RAD = np.deg2rad(30.0)
 """Turn of gravity from rest to rest that counts, rad."""
 
@@ -89,17 +92,21 @@ def _turns(t: Array, up: Array, gyr: Array) -> Iterator[TurnBetweenRests]:
     if step <= 0:
         # most rows share the time of the row before: nothing says how long a rest is
         return
-    rests = [
+    inner = (
         _inner_part(*rest, step)
         for rest in _rests(up, max(4, round(GROUP_S / step)), step)
-    ]
+    )
+    rests = [(a, b) for a, b in inner if _lies_still(up[a:b])]
+    if not rests:
+        return
+    # a hand trembles: what one short rest reads is no bias
+    zero = np.vstack([gyr[a:b] for a, b in rests]).mean(axis=0)
     for (a, b), (c, d) in zip(rests, rests[1:], strict=False):
         before, behind = (_direction(up[i:j]) for i, j in ((a, b), (c, d)))
         turned = np.arccos(np.clip(before @ behind, -1, 1))
         steps = np.diff(t[b - 1 : c + 1])
         if turned < MIN_TURN_RAD or t[c] - t[b] > TURN_S or (steps > GROUP_S).any():
             continue
-        zero = (gyr[a:b].mean(axis=0) + gyr[c:d].mean(axis=0)) / 2
         angles = (gyr[b : c + 1] - zero) * steps[:, None]
         if not np.isfinite(angles).all():
             continue
@@ -129,6 +136,13 @@ def _inner_part(first: int, last: int, step: float) -> tuple[int, int]:
     """
     margin = min((last - first) // 4, round(MARGIN_S / step))
     return first + margin, last - margin
+
+
+def _lies_still(up: Array) -> bool:
+    """Whether gravity does not turn: a slow turn is as calm as a hand that trembles."""
+    half = len(up) // 2
+    begun, ended = _direction(up[:half]), _direction(up[half:])
+    return bool(np.linalg.norm(ended - begun) < STEADY_RAD)
 
 
 def _direction(up: Array) -> Array:

@@ -204,11 +204,16 @@ def _determined_parameters(
     if effect is None:
         return {}
     params = [effect.params[j] for j in group.params]
-    return {
+    out = {
         p.name: Quantity(float(v), float(s), p.unit)
         for p, v, s, b in zip(params, values, sigma, before, strict=True)
         if s**2 < thresholds.DETERMINED * b**2
     }
+    if there.fit.dictionary.unoriented.all():
+        out = found_effects.merge_turned_parameters(
+            group, values, covariance, before, out
+        )
+    return out
 
 
 def cause_quantities(there: WidenedSet, member: Member) -> dict[str, Quantity]:

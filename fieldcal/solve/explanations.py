@@ -209,9 +209,9 @@ def _group_variants(d: Dictionary, group: Group) -> list[Group]:
     if not isinstance(effect, Motion | Sensor):
         raise TypeError(f"{group.cause} has no equation")
     whole = next(at for part, at in parameter_groups(d, effect) if part == group.part)
-    group = replace(group, params=_in_axes_of(d, group))
     if isinstance(effect, Motion) or len(whole) > MAX_SUBSET_PARAMETERS:
-        return groups_at_points(d, group, [(group.shape, group.origin)])
+        whole_group = replace(group, params=_in_axes_of(d, group))
+        return groups_at_points(d, whole_group, [(group.shape, group.origin)])
     own = (group.shape, group.origin)
     grid = [own, *(point for point in shape_points(d, effect) if point != own)]
     out = [
@@ -228,9 +228,9 @@ def _group_variants(d: Dictionary, group: Group) -> list[Group]:
 def _in_axes_of(d: Dictionary, group: Group) -> tuple[int, ...]:
     """Parameters of an effect in the axes of the parameter set.
 
-    An explanation of known orientations has parameters that a rotation of the device
-    can produce from others; where the set takes all orientations as unknown, they are
-    zero in its axes.
+    If the orientation is unknown, the axes are chosen so that the parameters that a
+    rotation of the device can produce from others are zero. A search keeps all of them;
+    a mean of both would be in no axes at all.
     """
     effect = group.effect
     if effect is None or d.x.oriented.any():

@@ -135,6 +135,8 @@ def parameter_estimates(
             if s**2 < thresholds.DETERMINED * wide**2:
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
+        if explanation.dictionary.unoriented.all():
+            own = merge_turned_parameters(group, value, covariance, prior, own)
         out |= _with_arrival_uncertainty(own, group)
     for shape in effect.shapes:
         known = [m for m in standing.members if shape.name in m[1].shape]
@@ -145,6 +147,46 @@ def parameter_estimates(
         at = float(weight @ [at for at, _ in shapes] / weight.sum())
         out[shape.name] = Quantity(at, float(weight.sum() ** -0.5), shape.unit)
     return out
+
+
+def merge_turned_parameters(
+    group: Group,
+    value: Array,
+    covariance: Array,
+    prior: Array,
+    own: dict[str, Quantity],
+) -> dict[str, Quantity]:
+    """Replace two parameters by their sum where only the sum is determined.
+
+    If the orientation of the device is unknown, a turn of the whole device changes some
+    parameters into each other, and only their sum is seen. Where the sum is better
+    determined than either, it takes the place of both; where the search took only one
+    of them, that is the sum.
+
+    Parameters
+    ----------
+    group : of an effect
+    value, covariance, prior : (k,), (k, k), (k,) of its parameters; `prior` is their
+        standard deviation before the rows
+    own : its parameters by name
+
+    """
+    effect, out = group.effect, dict(own)
+    if effect is None:
+        return out
+    names = [effect.params[j].name for j in group.params]
+    for gone, kept in effect.turned_into.items():
+        if kept not in names and gone in out:
+            out[kept] = out.pop(gone)
+        if not {gone, kept} <= set(names):
+            continue
+        at = [names.index(gone), names.index(kept)]
+        cov, before = covariance[np.ix_(at, at)], float((prior[at] ** 2).sum())
+        if cov.sum() < min(np.diag(cov).min(), thresholds.DETERMINED * before):
+            out.pop(gone, None)
+            total, sigma = value[at].sum(), np.sqrt(cov.sum())
+            out[kept] = Quantity(float(total), float(sigma), effect.unit(kept))
+    return {p.name: out[p.name] for p in effect.params if p.name in out}
 
 
 def _with_arrival_uncertainty(

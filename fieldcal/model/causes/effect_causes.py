@@ -177,13 +177,10 @@ def parameter_groups(
     """Parts and parameter indices of an effect.
 
     One part for each triad if its parameters are named after channels; else one, "".
-    Where nobody knows how the device stood, those that a rotation of the device makes
-    of others are left out: they are zero in the axes that are chosen.
     """
     names = [p.name for p in effect.params]
     if not set(names) <= set(CHANNELS):
-        absent = {} if table.x.oriented.any() else effect.turned_into
-        return [("", tuple(j for j, name in enumerate(names) if name not in absent))]
+        return [("", tuple(range(len(names))))]
     observed = {CHANNELS[c] for c in table.observed}
     return [
         (part, tuple(j for j, n in enumerate(names)

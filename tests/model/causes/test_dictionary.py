@@ -93,23 +93,6 @@ def test_the_earth_that_is_known_or_not_seen_is_no_cause() -> None:
     np.testing.assert_allclose(gyr["bias", "gyr"].typical, [0.2, 0.4])
 
 
-@pytest.mark.parametrize("known", [0, 1, 9])
-def test_cross_coupling_is_offered_in_one_set_of_axes(known: int) -> None:
-    """Where no orientation is known, k21, k31 and k32 are a turn of the device."""
-    (cause,) = (
-        c
-        for c in made(ladder(free=tuple(range(known, 9)))).causes
-        if c.name == "cross_coupling"
-    )
-    offered = {
-        cause.variants[0].effect.params[j].name  # type: ignore[union-attr]
-        for group in cause.variants
-        for j in group.params
-    }
-    symmetric = {"k12", "k13", "k23"}
-    assert offered == (symmetric | {"k21", "k31", "k32"} if known else symmetric)
-
-
 def test_without_angles_the_earth_turns_with_the_device() -> None:
     d = made(ladder(free=(2, 5)))
     assert d.unoriented.tolist() == [p in (2, 5) for p in range(9)]

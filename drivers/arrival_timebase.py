@@ -148,8 +148,8 @@ class ArrivalTimebase:
 
 def _split_by_arrival(steps: Array, t_host: Array) -> Iterator[tuple[Array, float]]:
     """Split into batches of equal arrival time."""
-    cuts = np.flatnonzero(t_host[1:] - t_host[:-1]) + 1
-    if not len(cuts):
+    cuts = np.flatnonzero(np.diff(t_host)) + 1
+    if not len(cuts):  # as a link that is read in time gives them
         yield steps, float(t_host[-1])
         return
     for batch, host in zip(np.split(steps, cuts), np.split(t_host, cuts), strict=True):

@@ -9,7 +9,7 @@ hand that trembles makes no bumps. It is left out. Source: model of this project
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -86,13 +86,18 @@ def _gently_pushed_stretches(
             first = max(push.first - around, 0)
             near = z[first : push.last + around]
             at = (push.first - first, push.last - first)
-            courses = [
-                *steady_changes(near, at, rate / block),
-                *swings(near, at, rate / block),
-            ]
+            courses = _courses_without_push(near, at, rate / block)
             if all(push.is_in(near - course) for course in courses):
                 out[p].append(_gentle_fault(recording, p, push, loud[p], block))
     return out
+
+
+def _courses_without_push(
+    near: Array, at: tuple[int, int], rate: float
+) -> Iterator[Array]:
+    """Courses that may look like a push from `at[0]` to `at[1]`, the quickest first."""
+    yield from steady_changes(near, at, rate)
+    yield from swings(near, at, rate)
 
 
 def _block_means(

@@ -91,6 +91,17 @@ def test_what_a_trembling_hand_reads_in_one_short_rest_is_no_bias(seed: int) -> 
     assert found == pytest.approx(1.0, rel=0.03)
 
 
+def test_a_rate_that_is_not_known_at_rest_costs_the_others_nothing() -> None:
+    rows = swung(3)
+    rest = np.flatnonzero(np.linalg.norm(rows[:, 4:], axis=1) < 0.01)
+    rates = rows[:, 4:].copy()
+    rates[rest[50:53]] = np.nan
+    found = closing_scale(rows[:, 0], rows[:, 1:4] / G, rates, 1.15)
+    assert found == pytest.approx(1.0, rel=0.03)
+    rates[rest] = np.nan
+    assert closing_scale(rows[:, 0], rows[:, 1:4] / G, rates, 1.15) is None
+
+
 def test_a_slow_turn_is_no_rest() -> None:
     """Gravity turns by 10 degrees a second, as calm as it lies."""
     rows = swung(2)

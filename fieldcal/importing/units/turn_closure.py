@@ -97,10 +97,11 @@ def _turns(t: Array, up: Array, gyr: Array) -> Iterator[TurnBetweenRests]:
         for rest in _rests(up, max(4, round(GROUP_S / step)), step)
     )
     rests = [(a, b) for a, b in inner if _lies_still(up[a:b])]
-    if not rests:
+    at_rest = np.vstack([np.empty((0, 3)), *(gyr[a:b] for a, b in rests)])
+    at_rest = at_rest[np.isfinite(at_rest).all(axis=1)]
+    if not len(at_rest):
         return
-    # a hand trembles: what one short rest reads is no bias
-    zero = np.vstack([gyr[a:b] for a, b in rests]).mean(axis=0)
+    zero = at_rest.mean(axis=0)  # a hand trembles: what one short rest reads is no bias
     for (a, b), (c, d) in zip(rests, rests[1:], strict=False):
         before, behind = (_direction(up[i:j]) for i, j in ((a, b), (c, d)))
         turned = np.arccos(np.clip(before @ behind, -1, 1))

@@ -35,6 +35,7 @@ from fieldcal.navigator.run_rows import (
     RunPosterior,
     RunRows,
     RunSetup,
+    evidence_slopes,
     run_posterior,
     run_rows,
 )
@@ -46,8 +47,8 @@ UNITS = ("m/s^2",) * 3 + ("1",) * 3 + ("rad/s",) * 3
 PRIOR_SIGMAS = 3.0 * np.repeat([priors.BIAS_ACC, priors.SCALE, priors.BIAS_GYR], 3)
 """Prior standard deviations: a few times those of consumer grade."""
 
-SEARCH_TOLERANCE = {"fatol": 0.02, "xatol": 0.03}
-"""Tolerances of the search for the noise of (2): log evidence, and ln of each."""
+SEARCH_TOLERANCE = {"gtol": 0.02}
+"""Tolerance of the search for the noise of (2): slope of log evidence by ln of each."""
 
 PASSES = 2
 """Number of times the rows are linearised about the estimate."""
@@ -219,15 +220,27 @@ def _likeliest_noise(
 
     def with_noise(logs: Array) -> Array:
         out = np.array(NOISE_LEAST)
-        out[acts] = np.exp(np.clip(logs, least, most))
+        out[acts] = np.exp(logs)
         return out
 
-    def worse(logs: Array) -> float:
-        beyond = float(np.sum((logs - np.clip(logs, least, most)) ** 2))
-        return 100.0 * beyond - run_posterior(rows, sizes, with_noise(logs)).score
+    def worse(logs: Array) -> tuple[float, Array]:
+        noise = with_noise(logs)
+        found = run_posterior(rows, sizes, noise)
+        return -found.score, -evidence_slopes(rows, found, noise)[acts]
 
-    start = _coarse_minimum(worse, least, most) if near is None else np.log(near[acts])
-    found = minimize(worse, start, method="Nelder-Mead", options=SEARCH_TOLERANCE)
+    def score(logs: Array) -> float:
+        return run_posterior(rows, sizes, with_noise(logs)).score
+
+    start = _coarse_maximum(score, least, most) if near is None else np.log(near[acts])
+    bounds = list(zip(least, most, strict=True))
+    found = minimize(
+        worse,
+        start,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=bounds,
+        options=SEARCH_TOLERANCE,
+    )
     return with_noise(found.x)
 
 
@@ -265,13 +278,13 @@ def _linearise_about(
     )
 
 
-def _coarse_minimum(
-    worse: Callable[[Array], float], least: Array, most: Array
+def _coarse_maximum(
+    score: Callable[[Array], float], least: Array, most: Array
 ) -> Array:
-    """Point of a coarse grid of the logarithms with the least value of `worse`."""
+    """Point of a coarse grid of the logarithms with the greatest score."""
     parts = [np.linspace(a, b, 5)[1:-1] for a, b in zip(least, most, strict=True)]
     points = np.stack(np.meshgrid(*parts), axis=-1).reshape(-1, len(least))
-    return np.asarray(points[int(np.argmin([worse(p) for p in points]))])
+    return np.asarray(points[int(np.argmax([score(p) for p in points]))])
 
 
 def _determined_parameters(best: _SetupFit, off: tuple[str, ...]) -> DriftEstimate:

@@ -3,8 +3,13 @@
     y_r = H (X_phi (phi + phi_r) + X_p p_r + X_e C e + X_a C (a + k f + j_r)) + n   (1)
     n ~ N(0, N_a^2 K_a + N_g^2 K_g + q_v^2 I_v + q_p^2 I_p)                         (2)
 
-I_v and I_p select the rows of velocity and position. Symbols and units as in
-`estimate`.
+I_v and I_p have the rows of velocity and position, with the share of the noise that
+remains between two samples. With V the covariance of all rows and their parameters,
+
+    d ln Z / d ln N = N^2 (y^T V^-1 K V^-1 y - tr V^-1 K)                           (3)
+
+Symbols and units as in `estimate`. Source of (3): Rasmussen and Williams, Gaussian
+Processes for Machine Learning, 2006, (5.9).
 """
 
 from __future__ import annotations
@@ -55,6 +60,7 @@ class RunRows:
     ----------
     y : (n,) errors of the solution
     is_position : (n,) whether a row is of position, m, or of velocity, m/s
+    noise_share : (n,) variance of the output noise, of that of a sample
     design : (n, 12) columns of the parameters in the order of `NAMES`, and of phi
     attitude_sigma : rad, standard deviation of phi_r about any axis
     attitude_design : (n, 3) columns of phi_r
@@ -66,6 +72,7 @@ class RunRows:
 
     y: Array
     is_position: NDArray[np.bool_]
+    noise_share: Array
     design: Array
     attitude_sigma: float
     attitude_design: Array
@@ -76,15 +83,20 @@ class RunRows:
 
     def covariance(self, noise: Array) -> Array:
         """Covariance of the rows for N_a, N_g, q_v, q_p, J, (n, n)."""
-        force, rate, velocity, position, jitter = noise**2
         turned = self.attitude_design @ self.attitude_design.T
-        whole = (
-            self.attitude_sigma**2 * turned
-            + self.start_covariance
-            + jitter * self.jitter
+        whole = self.attitude_sigma**2 * turned + self.start_covariance
+        return np.asarray(whole + np.tensordot(noise**2, self.noise_parts, 1))
+
+    @property
+    def noise_parts(self) -> Array:
+        """Covariance of the rows for 1 of each noise of (2), and of J, (5, n, n)."""
+        velocity, position = (
+            np.diag(np.where(self.is_position == of_position, self.noise_share, 0.0))
+            for of_position in (False, True)
         )
-        whole += np.diag(np.where(self.is_position, position, velocity))
-        return np.asarray(whole + force * self.force_noise + rate * self.rate_noise)
+        return np.array(
+            [self.force_noise, self.rate_noise, velocity, position, self.jitter]
+        )
 
     def attitude_error(self, noise: Array, mean: Array) -> Array:
         """Estimate phi_r, (3,) rad, if the parameters and phi are `mean`, (12,)."""
@@ -111,6 +123,7 @@ def run_rows(run: NavigatorRun, setup: RunSetup, r: int) -> RunRows:
     return RunRows(
         run.values[:, used].ravel(),
         is_position,
+        np.repeat(run.noise_share, len(used)),
         np.hstack([force, force * f, rate, start[:, PHI]]),
         float(setup.attitude_sigmas[r]),
         start[:, PHI],
@@ -146,3 +159,17 @@ def run_posterior(rows: Sequence[RunRows], sizes: Array, noise: Array) -> RunPos
     chi2 = square - float(b @ mean)
     score = -0.5 * (chi2 + log_det + float(np.linalg.slogdet(m)[1]))
     return RunPosterior(mean, covariance, score, chi2)
+
+
+def evidence_slopes(
+    rows: Sequence[RunRows], found: RunPosterior, noise: Array
+) -> Array:
+    """Slopes of ln Z by the logarithm of each noise, (5,), at its posterior, (3)."""
+    out = np.zeros(len(noise))
+    for one in rows:
+        inverse = np.linalg.inv(one.covariance(noise))
+        seen = inverse @ one.design
+        left = inverse @ (one.y - one.design @ found.mean)  # V^-1 y
+        own = inverse - seen @ found.covariance @ seen.T  # V^-1
+        out += np.tensordot(one.noise_parts, np.outer(left, left) - own, 2)
+    return np.asarray(noise**2 * out)  # (3)

@@ -22,7 +22,8 @@ COLUMNS = (("ve", "vd", "vn"), ("pe", "pd", "pn"))
 """East, down, north: the order of the base axes of a base that points north."""
 
 INSTANTS = 24
-"""Number of instants of a run that are used, at equal intervals."""
+"""Number of instants of a run that are used, at equal intervals; no more than it has
+samples, so that no two depend on the same one."""
 
 SHORTEST_S = 10.0
 
@@ -61,11 +62,14 @@ class NavigatorRun:
     ----------
     step : s
     values : (m, 6) velocity, and position less that at the start of the run
+    noise_share : (m,) variance of the noise of each instant, of that of a sample: less
+        than 1 between two samples
 
     """
 
     step: float
     values: Array
+    noise_share: Array
 
 
 def read_solution(path: Path) -> NavigationSolution:
@@ -144,9 +148,21 @@ def runs_in_windows(
                 f" must lie within {solution.t[0]:g} to {solution.t[-1]:g} s, not"
                 f" {start:g} to {end:g} s"
             )
-        step = (end - start) / INSTANTS
-        at = start + step * np.arange(INSTANTS + 1)
-        values = np.stack([np.interp(at, solution.t, v) for v in solution.values.T])
-        begun = values[:, :1] * (np.arange(6) >= 3)[:, None]
-        out.append(NavigatorRun(step, (values - begun).T[1:]))
+        out.append(_run_between(solution, start, end))
     return out
+
+
+def _run_between(
+    solution: NavigationSolution, start: float, end: float
+) -> NavigatorRun:
+    """The run from start to end, interpolated between samples."""
+    samples = int(((solution.t > start) & (solution.t <= end)).sum())
+    step = (end - start) / max(min(INSTANTS, samples), 1)
+    at = np.arange(start, end + step / 2, step)
+    values = np.stack([np.interp(at, solution.t, v) for v in solution.values.T])
+    begun = values[:, :1] * (np.arange(6) >= 3)[:, None]
+    after = np.clip(np.searchsorted(solution.t, at), 1, len(solution.t) - 1)
+    before, next_ = solution.t[after - 1], solution.t[after]
+    u = np.clip((at - before) / (next_ - before), 0.0, 1.0)
+    share = u**2 + (1 - u) ** 2
+    return NavigatorRun(step, (values - begun).T[1:], share[1:])

@@ -28,6 +28,14 @@ class GyroCrossCoupling(Sensor):
     """Cross-coupling of the gyroscopes."""
 
     params = tuple(Param(f"s{i + 1}{j + 1}", "1", 2e-2) for i, j in PAIRS)
+    turned_by = {
+        f"s{i + 1}{j + 1}": (
+            "cross_coupling",
+            f"k{max(i, j) + 1}{min(i, j) + 1}",
+            1.0 if i < j else -1.0,
+        )
+        for i, j in PAIRS
+    }
     usual = True
     covariate = "rate about the other axes"
     decided_by = "a turn about each axis in turn, by 90° or more"

@@ -100,6 +100,10 @@ class Effect(ABC):
     """Parameters with those that they become in a device that is turned as a whole:
     where nobody knows how it stands, the rows show the sum of the two."""
 
+    turned_by: ClassVar[Mapping[str, tuple[str, str, float]]] = {}
+    """What that turn adds to parameters: another effect, its parameter that becomes
+    zero, and the sign."""
+
     absent: ClassVar[str] = ""
     """When it adds nothing to biases and scale factors that it changes, in words: they
     are fitted beside it as they are then. Empty for an effect that does not change."""

@@ -23,6 +23,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import (
     Member,
 )
+from fieldcal.model.posterior.common_axes import in_common_axes, parameter_rows
 from fieldcal.model.posterior.held_out import held_out_turn_residuals, turn_residual
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.model.system.fitted import FittedSet
@@ -126,16 +127,21 @@ def parameter_estimates(
         return random_sizes(explanation, standing)
     out: dict[str, Quantity] = {}
     for member in standing.members:
-        group = member[1]
-        value, covariance = explanation.model_average.average_of_member(member)
-        _, _, prior = column_estimates(explanation.best.set, group.columns)
+        group, best = member[1], explanation.best.set
+        free = bool(explanation.dictionary.unoriented.all())
+        if free:
+            group = in_common_axes(best, group)
+        told = (member[0], group)
+        value, covariance = explanation.model_average.average_of_member(told)
+        rows = parameter_rows(best, told, turned=free)
+        prior = np.sqrt(rows**2 @ best.state.prior_sigma**2)
         own: dict[str, Quantity] = {}
         sigma = np.sqrt(np.diag(covariance))
         for j, v, s, wide in zip(group.params, value, sigma, prior, strict=True):
             if s**2 < thresholds.DETERMINED * wide**2:
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
-        if explanation.dictionary.unoriented.all():
+        if free:
             own = merge_turned_parameters(group, value, covariance, prior, own)
         out |= _with_arrival_uncertainty(own, group)
     for shape in effect.shapes:

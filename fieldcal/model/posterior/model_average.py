@@ -31,14 +31,18 @@ from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.posterior.common_axes import (
+    group_in,
+    parameter_rows,
+    pick_columns,
+)
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE, covariance_of_means
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.size_average import average_over_sizes
 
-Places = Callable[[Set], Sequence[Index]]
-"""Indices of some quantities in the state of a set. A quantity with several indices is
-their sum; one without an index is 0."""
-
+Pick = Callable[[Set], Array]
+"""Rows (k, a) that give k quantities from the a columns of a set; a quantity that the
+set does not have is a row of zeros."""
 
 Estimate = tuple[Array, Array]
 """Mean (a,) of a set's columns, and a root R of their covariance R R^T, (a, m)."""
@@ -81,32 +85,29 @@ class ModelAverage:
 
         If orientations are not known, a rotation of the device axes turns one
         parameter into another, such as k13 into k31. Sets with other parameters of the
-        cause are then omitted.
+        cause are then omitted; parameters that only change with the axes are stated in
+        the common ones.
         """
         cause, group = member
         containing = [(s, w) for s, w in self.sets if cause.key in s.keys]
-        if self.posterior.sets.dictionary.unoriented.any():
+        unoriented = self.posterior.sets.dictionary.unoriented
+        free = bool(unoriented.all())
+        if unoriented.any() and not (free and group.effect and group.effect.turned_by):
             mine = set(group.params)
             containing = [
-                (s, w)
-                for s, w in containing
-                if set(_group_in(s, member).params) <= mine
+                (s, w) for s, w in containing if set(group_in(s, member).params) <= mine
             ]
 
         if not containing:  # the member is too unlikely to count
             containing = [(s, 1.0) for s in self.best]
 
-        def places(fitted: Set) -> list[Index]:
-            own = _group_in(fitted, member)
-            at = dict(zip(own.params or own.columns, own.columns, strict=True))
-            wanted = [at.get(p, -1) for p in group.params or group.columns]
-            return [np.flatnonzero(fitted.state.columns == c)[-1:] for c in wanted]
-
-        return average_over_sets(containing, places, self._estimate)
+        pick = partial(parameter_rows, member=member, turned=free)
+        return average_over_sets(containing, pick, self._estimate)
 
     def average_of_columns(self, columns: Index) -> tuple[Array, Array]:
         """Mean (k,) and covariance (k, k) of columns."""
-        return average_over_sets(self.sets, _places_of(columns), self._estimate)
+        pick = partial(pick_columns, columns=columns)
+        return average_over_sets(self.sets, pick, self._estimate)
 
     def _estimate(self, fitted: Set) -> Estimate:
         """Estimate of a set, with the uncertainty of `unfitted` effects; cached."""
@@ -116,29 +117,17 @@ class ModelAverage:
         return self._known[fitted]
 
 
-def _group_in(fitted: Set, member: Member) -> Group:
-    """The group by which a set has the cause of a member."""
-    (own,) = (g for c, g in fitted.members if c.key == member[0].key)
-    return own
-
-
 def average_of_columns(
     sets: Sequence[tuple[Set, float]], columns: Index, unfitted: Sequence[Group] = ()
 ) -> tuple[Array, Array]:
     """Mean (k,) and covariance (k, k) of columns over weighted sets."""
-    return average_over_sets(
-        sets, _places_of(columns), partial(set_estimate, unfitted=unfitted)
-    )
-
-
-def _places_of(columns: Index) -> Places:
-    """Places of columns of the dictionary."""
-    return lambda fitted: [np.flatnonzero(fitted.state.columns == c) for c in columns]
+    pick = partial(pick_columns, columns=columns)
+    return average_over_sets(sets, pick, partial(set_estimate, unfitted=unfitted))
 
 
 def average_over_sets(
     sets: Sequence[tuple[Set, float]],
-    places: Places,
+    pick: Pick,
     estimate: Callable[[Set], Estimate] | None = None,
 ) -> tuple[Array, Array]:
     """Mean (k,) and covariance (k, k) of quantities over weighted sets, (1).
@@ -147,13 +136,10 @@ def average_over_sets(
     """
     means, covs = [], []
     for fitted, _ in sets:
-        at = places(fitted)
-        pick = np.zeros((len(at), len(fitted.state.columns)))
-        for row, indices in zip(pick, at, strict=True):
-            row[indices] = 1.0
+        rows = pick(fitted)
         mean, root = (estimate or set_estimate)(fitted)
-        picked = pick @ root
-        means.append(pick @ mean)
+        picked = rows @ root
+        means.append(rows @ mean)
         covs.append(picked @ picked.T)
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()

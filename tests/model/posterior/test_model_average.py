@@ -53,8 +53,8 @@ def test_averages_are_those_of_draws_from_the_sets() -> None:
     first, last = one.state.columns[0], one.state.columns[-1]
     mean, cov = average_over_sets(
         sets,
-        lambda s: [np.flatnonzero(np.isin(s.state.columns, [first, last])),
-                   np.flatnonzero(s.state.columns == last)],
+        lambda s: np.array([np.isin(s.state.columns, [first, last]),
+                            s.state.columns == last], dtype=float),
     )  # fmt: skip
     drawn = []
     for there, count in ((one, 90_000), (two, 30_000)):

@@ -9,6 +9,7 @@ from small_sessions import LADDER, SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
+from fieldcal.model.posterior.common_axes import pick_columns
 from fieldcal.model.posterior.model_average import average_of_columns, average_over_sets
 from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
@@ -71,8 +72,8 @@ def test_an_amplitude_is_uncertain_by_what_the_time_constant_moves_it() -> None:
     own = average_over_sizes(found.search.sets, found.best)
     (alone,) = np.diag(average_of_columns([(own, 1.0)], at)[1])
     sets = [(s, 0.5) for s in sets_at_other_time_constants(found)]
-    (whole,) = np.diag(average_over_sets(sets, lambda s: [
-        np.flatnonzero(s.state.columns == s.members[0][1].columns[0])])[1])  # fmt: skip
+    (whole,) = np.diag(average_over_sets(sets, lambda s: pick_columns(
+        s, s.members[0][1].columns[:1]))[1])  # fmt: skip
     tau, sigma = group.shape["tau_s"], group.shape_sigma
     system = found.fit.system
     assert isinstance(system, WindowSystem)

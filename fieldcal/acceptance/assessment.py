@@ -296,7 +296,12 @@ def _restart_warnings(marks: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def limits_path(session: Session, given: Path | None) -> Path | None:
     """File of limits: the one given, or the one that the session's plan names."""
-    run = session.about.raw.get("run")
-    if given is None and isinstance(run, Mapping) and "limits" in run:
+    return planned_limits(session.about.raw) if given is None else given
+
+
+def planned_limits(raw: Mapping[str, Any]) -> Path | None:
+    """File of limits that the plan in a session.toml names; None without any."""
+    run = raw.get("run")
+    if isinstance(run, Mapping) and "limits" in run:
         return Path(str(run["limits"]))
-    return given
+    return None

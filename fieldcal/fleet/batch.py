@@ -12,7 +12,6 @@ import pyarrow.parquet as pq
 from fieldcal.core.errors import InputError, disk_says
 from fieldcal.core.file_names import storable_text
 from fieldcal.fleet.outcome import SessionTask
-from fieldcal.fleet.tree import fingerprint
 from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
@@ -41,13 +40,19 @@ class SessionBatch:
     def unprocessed(self) -> list[str]:
         """Sessions whose row in the store is missing or of other files or options."""
         known = self.database.run(sessions.fingerprints)
-        options = self.task.options
         return [
             str(folder)
             for folder in self.folders
             if (mark := known.get(storable_text(str(folder)))) is None
-            or mark != _fingerprint(folder, options)
+            or mark != self._fingerprint(folder)
         ]
+
+    def _fingerprint(self, folder: Path) -> str | None:
+        """Fingerprint of a session; None if its files cannot be read."""
+        try:
+            return self.task.fingerprint(folder)
+        except OSError:
+            return None
 
     def process(
         self, folders: Sequence[str], pool: WorkerPool
@@ -114,14 +119,6 @@ class SessionBatch:
             ) from error
         finally:
             part.unlink(missing_ok=True)
-
-
-def _fingerprint(folder: Path, options: str) -> str | None:
-    """Fingerprint of a session; None if its files cannot be read."""
-    try:
-        return fingerprint(folder, options)
-    except OSError:
-        return None
 
 
 def parquet_schema(names: Sequence[str]) -> pa.Schema:

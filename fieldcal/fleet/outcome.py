@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fieldcal.acceptance.assessment import assess, limits_path, start_time, with_faults
+from fieldcal.acceptance.assessment import (
+    assess,
+    limits_path,
+    planned_limits,
+    start_time,
+    with_faults,
+)
 from fieldcal.calibration import limits
+from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
@@ -18,7 +26,7 @@ from fieldcal.evaluation.solution import PreparedSession, solve_prepared
 from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration
-from fieldcal.session.folder import Session
+from fieldcal.session.folder import DESCRIPTION, Session
 from fieldcal.session.recorded_part import recorded_part
 
 OUT_OF_MEMORY = "it needs more memory than there is"
@@ -44,11 +52,23 @@ class SessionTask:
         bounds = Path(self.limits).read_text("utf-8") if self.limits else ""
         return f"diagnose={self.diagnose}\n{bounds}"
 
+    def fingerprint(self, folder: Path) -> str:
+        """Hash of a session's inputs, the options, and the limits it is judged by.
+
+        Raises
+        ------
+        OSError
+            If a file of the session cannot be read.
+
+        """
+        own = "" if self.limits else _limits_in_plan(folder)
+        return fingerprint(folder, f"{self.options}\n{own}")
+
     def __call__(self, folder: str) -> StoredSession:
         """Process a session; an error is stated in the row that is returned."""
         mark, name = None, storable_text(folder)
         try:
-            mark = fingerprint(Path(folder), self.options)
+            mark = self.fingerprint(Path(folder))
             made = self._process(Path(folder))
             return replace(made, folder=folder, fingerprint=mark)
         except FieldcalError as error:
@@ -90,6 +110,18 @@ class SessionTask:
             if explanation is None
             else reduce_session(explanation).to_bytes(),
         )
+
+
+def _limits_in_plan(folder: Path) -> str:
+    """Text of the limits that session.toml names; empty without any.
+
+    What cannot be read is reported when the session is processed.
+    """
+    with suppress(FieldcalError, OSError, ValueError):
+        raw = load_toml((folder / DESCRIPTION).read_text("utf-8"))
+        if (path := planned_limits(raw)) is not None:
+            return path.read_text("utf-8")
+    return ""
 
 
 def levels_of(session: Session) -> dict[str, str]:

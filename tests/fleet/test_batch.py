@@ -113,9 +113,8 @@ def quick(folder: str) -> sessions.StoredSession:
 class Quick(SessionTask):
     """A task that only looks."""
 
-    @property
-    def options(self) -> str:
-        return ""
+    def fingerprint(self, folder: Path) -> str:
+        return fingerprint(folder)
 
     def __call__(self, folder: str) -> sessions.StoredSession:
         return quick(folder)
@@ -143,12 +142,32 @@ def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
     assert batch.unprocessed() == [str(found[0])]
 
 
+@pytest.mark.parametrize("given", [True, False])
+def test_other_limits_are_another_judgement(
+    tree: Path, tmp_path: Path, given: bool
+) -> None:
+    """Whether the command names them or the session's own plan."""
+    file, folder = tmp_path / "limits.toml", tmp_path / "session"
+    shutil.copytree(tree / "station 1" / "session", folder)
+    file.write_text("[tactical]\nacc_bias = 0.02\n")
+    task = SessionTask(limits=str(file)) if given else SessionTask()
+    if not given:
+        with (folder / "session.toml").open("a") as about:
+            about.write(f'[run]\nlimits = "{file.as_posix()}"\n')
+    before = task.fingerprint(folder)
+    assert task.fingerprint(folder) == before
+    file.write_text("[tactical]\nacc_bias = 0.01\n")
+    assert task.fingerprint(folder) != before
+    file.unlink()  # is said when the session is processed
+    if not given:
+        assert task.fingerprint(folder) != before
+
+
 class Unstorable(SessionTask):
     """A task of which one result is none that JSON can represent."""
 
-    @property
-    def options(self) -> str:
-        return ""
+    def fingerprint(self, folder: Path) -> str:
+        return fingerprint(folder)
 
     def __call__(self, folder: str) -> sessions.StoredSession:
         made = quick(folder)

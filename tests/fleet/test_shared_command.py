@@ -11,7 +11,6 @@ import pytest
 from test_shared import fleet
 
 from fieldcal.cli import main
-from fieldcal.fleet import tree
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.workers import WorkerPool
 from fieldcal.history import sessions
@@ -31,7 +30,7 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         made[str(folder)] = one
 
     def solved(task: SessionTask, folder: str) -> StoredSession:
-        one, mark = made[folder], tree.fingerprint(Path(folder), task.options)
+        one, mark = made[folder], task.fingerprint(Path(folder))
         return StoredSession(
             folder, one.serial, one.levels, result={}, fingerprint=mark,
             reduced=one.reduced,

@@ -52,7 +52,8 @@ from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.turn_rows import Turns
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.model.turns.turn import Turn, TurnTracker
+from fieldcal.model.turns.turn import Turn
+from fieldcal.model.turns.turn_tracker import TurnTracker
 from fieldcal.session.description import Description
 
 MAX_RESUMPTIONS = 2

@@ -22,7 +22,7 @@ from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
-from fieldcal.model.turns.turn import TurnTracker
+from fieldcal.model.turns.turn_tracker import TurnTracker
 from fieldcal.solve.agreement import TriadFit, triad_agreement
 from fieldcal.solve.averaging import (
     AllParameters,

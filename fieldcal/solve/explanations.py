@@ -40,8 +40,8 @@ from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
-from fieldcal.model.turns.turn import select_rows
 from fieldcal.physics.effect import Motion, Scatter, Sensor
+from fieldcal.physics.experience_rows import select_rows
 from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.solve.warm_scales import WARM_SCALE
 

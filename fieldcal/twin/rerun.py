@@ -30,7 +30,8 @@ from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
-from fieldcal.model.turns.turn import Turn, TurnTracker
+from fieldcal.model.turns.turn import Turn
+from fieldcal.model.turns.turn_tracker import TurnTracker
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.twin import device as twin

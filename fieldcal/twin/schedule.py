@@ -17,8 +17,9 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
-from fieldcal.model.turns.turn import Turn, select_rows
+from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.experience_rows import select_rows
 from fieldcal.sim_device.replay import HeldWindow
 from fieldcal.twin.ways import manoeuvre_of_turn
 

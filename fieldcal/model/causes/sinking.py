@@ -26,7 +26,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General, RowView, effect_basis
-from fieldcal.model.turns.turn import select_rows
+from fieldcal.physics.experience_rows import select_rows
 
 NAME = "sinking"
 

@@ -20,8 +20,9 @@ from fieldcal.model.turns.attitude import (
     first_row_of_each,
     interpolate_vectors,
 )
-from fieldcal.model.turns.turn import Turn, select_rows
+from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.experience_rows import select_rows
 
 
 @dataclass(frozen=True, slots=True)

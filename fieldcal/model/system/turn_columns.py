@@ -18,7 +18,8 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.turn_force_rows import turn_force_columns
-from fieldcal.model.turns.turn import Turn, concatenate_rows
+from fieldcal.model.turns.turn import Turn
+from fieldcal.physics.experience_rows import concatenate_rows
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,8 +29,10 @@ from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
 from fieldcal.model.system.turn_force_rows import TurnForceRows, settling_amplitudes
 from fieldcal.model.turns.attitude import closures, first_row_of_each, turn_geometry
-from fieldcal.model.turns.turn import Turn, TurnTracker, apply_way_effects, select_rows
+from fieldcal.model.turns.turn import Turn
+from fieldcal.model.turns.turn_tracker import TurnTracker, apply_way_effects
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.experience_rows import select_rows
 
 FORCE_STEP = 1e-3
 """Step of the force for a derivative, m/s^2."""

@@ -19,8 +19,8 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.model.turns.turn import select_rows
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.experience_rows import select_rows
 
 UNIT = np.array([2.0, 2.0, 4.0, 10.0, 10.0, 20.0])
 

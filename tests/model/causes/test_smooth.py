@@ -10,7 +10,7 @@ from small_sessions import G, ladder
 
 from fieldcal.model.causes import smooth
 from fieldcal.model.causes.smooth import CourseSpan
-from fieldcal.model.turns.turn import select_rows
+from fieldcal.physics.experience_rows import select_rows
 
 X = ladder()
 

@@ -20,7 +20,7 @@ from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.turn_gyro_errors import turn_gyro_errors
-from fieldcal.model.turns.turn import select_rows
+from fieldcal.physics.experience_rows import select_rows
 from fieldcal.session.description import parse_description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile, Sampling, Truth

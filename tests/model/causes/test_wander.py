@@ -12,7 +12,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes import smooth
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.turns.turn import select_rows
+from fieldcal.physics.experience_rows import select_rows
 
 X = ladder(rows=30)
 UNIT = np.ones(6)

@@ -16,8 +16,9 @@ from fieldcal.model.causes.columns import General
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.turns.attitude import turn_geometry
-from fieldcal.model.turns.turn import Turn, select_rows
+from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.experience_rows import select_rows
 
 M, STEP = 8, 1e-5
 SCALE = np.linspace(0.9, 1.2, 6)

@@ -14,12 +14,9 @@ from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.state import State, Term
-from fieldcal.model.turns.turn import (
-    Turn,
-    apply_way_effects,
-    other_gyro_errors,
-    select_rows,
-)
+from fieldcal.model.turns.turn import Turn
+from fieldcal.model.turns.turn_tracker import apply_way_effects, other_gyro_errors
+from fieldcal.physics.experience_rows import select_rows
 
 M, STEP, INTERVAL = 12, 0.05, 0.01
 RNG = np.random.default_rng(6)

@@ -12,7 +12,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns.motion import motion_bounds
-from fieldcal.model.turns.turn import TurnTracker
+from fieldcal.model.turns.turn_tracker import TurnTracker
 from fieldcal.session.description import parse_description
 
 RATE, NOISE = 100.0, 1e-4

@@ -7,12 +7,10 @@ import pytest
 
 from fieldcal.core.samples import Block, concat
 from fieldcal.windows.cells import CELL, CellAccumulator, CellTable
+from fieldcal.windows.joined_rests import LEAST_PROBABILITY, RestPeriod, join_rests
 from fieldcal.windows.same_attitude import (
-    LEAST_PROBABILITY,
     TYPICAL_ROTATION,
-    RestPeriod,
     flicker_bias_function,
-    join_rests,
     probability_unmoved,
 )
 from fieldcal.windows.stretches import cell_rows, still_stretches

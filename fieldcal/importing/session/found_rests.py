@@ -11,8 +11,8 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.windows.cells import CellTable, SamplesBetween
+from fieldcal.windows.joined_rests import RestPeriod, join_rests
 from fieldcal.windows.jumps import JumpFinder
-from fieldcal.windows.same_attitude import RestPeriod, join_rests
 from fieldcal.windows.stretch_ends import stretch_end_reasons
 from fieldcal.windows.stretches import (
     cell_rows,

@@ -28,8 +28,8 @@ from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
 from fieldcal.windows.cells import CellAccumulator
+from fieldcal.windows.joined_rests import RestPeriod
 from fieldcal.windows.jumps import JumpFinder
-from fieldcal.windows.same_attitude import RestPeriod
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.stretches import cell_rows
 

@@ -11,6 +11,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
     FF3A 0012                          counts in hexadecimal digits
     2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
+    23:59:50.7, 0.1, 0.2               ms behind the seconds without their zeros: 50.007
 
     0.981D+01  9.81 m/s²               numbers as Fortran writes them, or with units
     0.01,ax,0.12                       a line for each value; points of a database
@@ -25,6 +26,7 @@ import csv
 import re
 from collections.abc import Collection, Sequence
 
+from fieldcal.importing.text.bare_fractions import BareFractions
 from fieldcal.importing.text.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.text.dataflash_text import DataflashText
 from fieldcal.importing.text.labels import (
@@ -289,6 +291,6 @@ FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, RateOnTop, ReceiverLines, VectorNavLines, CheckedLines,
     EchoedMessages, EndedLines, DatabasePoints, QuotedCells, FortranNumbers, UnitCells,
     LongTable, LabelledValues, BarTable, ListCells,
-    TaggedLines, ArrivalPrefix, HexCells, ClockColumn,
+    TaggedLines, ArrivalPrefix, HexCells, BareFractions, ClockColumn,
 )  # fmt: skip
 """Forms in the order in which they are looked for."""

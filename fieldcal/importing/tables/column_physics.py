@@ -22,6 +22,7 @@ from fieldcal.importing.units.gravity_size import (
     GravityReading,
     are_means,
     estimate_gravity,
+    unequal_lengths,
 )
 from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.scales import (
@@ -244,7 +245,8 @@ def _force_and_rate_triples(
         alone = len(usual) == len(others) == 1
         return ((usual[0], others.pop()), why) if alone else None
     # of counts, any length is one: without a turn they are asked about
-    usual = [three for three in usual if _is_usual_gravity(sizes[three])]
+    usual = [three for three in usual if _is_usual_gravity(sizes[three])
+             and unequal_lengths(table[:, list(three)]) is None]  # fmt: skip
     if len(usual) == 1:
         pairs = [p for p in permutations({*forces, *rates}, 2) if p[0] == usual[0]]
         apart = [rate for _, rate in pairs if not set(rate) & set(usual[0])]

@@ -345,6 +345,21 @@ def test_rows_that_share_a_time_are_spread_evenly(
     assert np.ptp(off) < 0.011 and np.abs(np.diff(off)).max() < 0.005
 
 
+@pytest.mark.parametrize("rate", [105.0, 130.0, 190.0])
+def test_rows_between_the_steps_of_a_clock_are_kept(
+    tmp_path: Path, rate: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(6, rate, 1.0)
+    coarse = np.column_stack([np.floor(100 * rows[:, 0]) / 100, rows[:, 1:]])
+    path = write(tmp_path, coarse, heading="time,ax,ay,az,gx,gy,gz")
+    session = imported(path)
+    said = " ".join(capsys.readouterr().err.split())
+    assert "its clock steps by 0.01, and" in said
+    assert "% of its rows have the time of the row before" in said
+    assert len(session.block) == len(rows)
+    assert np.abs(session.block.t - rows[:, 0]).max() < 0.01
+
+
 def test_rows_of_which_now_more_now_fewer_share_a_time_are_asked_about(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -48,6 +48,10 @@ SHARED, TOGETHER, REGULAR = 0.5, 0.1, 0.9
 """Part of the rows that come with the row before, of a clock too coarse; the part of
 the mean step by which they follow; and of batches that have as many rows."""
 
+COARSE, MOST_TICKS = 0.01, 4.0
+"""Part of the rows that have the time of the row before, of a clock that is too coarse,
+and fewer of its steps than these from row to row."""
+
 JITTER = 0.5
 """Quartiles of the steps of a sensor's clock differ by a smaller part of the step;
 those of arrivals, of rows that wait for each other, by more."""
@@ -254,6 +258,22 @@ def shared_times(t: Array) -> SharedTimes | None:
     even = float((np.abs(rows - usual) <= 1).mean()) >= REGULAR
     equal = float((steps == 0).mean()) > SHARED
     return SharedTimes(float(np.median(np.diff(t[begins + 1]))), usual, even, equal)
+
+
+def coarse_tick(t: Array) -> float:
+    """Step of a clock with times (n,) that some rows share; 0 of a finer one.
+
+    Of two samples that came at once by a finer clock, the times are those of arrival.
+
+    >>> coarse_tick(np.floor(np.arange(100) / 1.3)), coarse_tick(np.arange(100.0))
+    (1.0, 0.0)
+    """
+    steps = np.diff(t[np.isfinite(t)])
+    if len(steps) < MIN_ROWS or not COARSE <= float((steps == 0).mean()) < SHARED:
+        return 0.0
+    own = steps[steps > 0]
+    tick = float(np.quantile(own, COARSE))
+    return tick if float(np.median(own)) < MOST_TICKS * tick else 0.0
 
 
 def time_units_of_bursts(t: Array) -> list[str]:

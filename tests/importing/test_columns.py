@@ -395,6 +395,20 @@ def test_axes_without_a_name_beside_gyroscopes_are_asked_about(
     assert np.isnan(session.block.acc).all()
 
 
+@pytest.mark.parametrize("heading", ["", "t,u 0,u 1,u 2,force 0,force 1,force 2"])
+def test_what_does_not_turn_as_gravity_does_is_no_rate(
+    tmp_path: Path, heading: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(3, 50.0)
+    others = np.random.default_rng(3).normal(0, 9.0, (len(rows), 3))
+    others[:, 0] = np.arange(len(rows)) % 256
+    log = np.column_stack([rows[:, 0], others, rows[:, 1:4]])
+    session = imported(write(tmp_path, log, heading=heading))
+    assert "and no others turn as they do" in capsys.readouterr().err
+    assert np.isnan(session.block.gyr).all()
+    np.testing.assert_allclose(session.block.acc, rows[:, 1:4], atol=1e-6)
+
+
 def test_an_axis_that_rests_within_a_step_is_one_of_three(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

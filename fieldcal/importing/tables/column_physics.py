@@ -24,7 +24,7 @@ from fieldcal.importing.units.gravity_size import (
     estimate_gravity,
     unequal_lengths,
 )
-from fieldcal.importing.units.rate_size import estimate_rate_unit
+from fieldcal.importing.units.rate_size import estimate_rate_unit, turns_deny
 from fieldcal.importing.units.scales import (
     ACC_OUT,
     ACC_SCALES,
@@ -252,8 +252,20 @@ def _force_and_rate_triples(
         apart = [rate for _, rate in pairs if not set(rate) & set(usual[0])]
         if len(apart) <= 1 and len({*forces, *rates}) - len(apart) == 1:
             why = "the length of the first three at rest is that of gravity"
+            if apart and _denied(table, clock, usual[0], apart[0], sizes[usual[0]]):
+                return (usual[0], None), f"{why}, and no others turn as they do"
             return (usual[0], apart[0] if apart else None), why
     return None
+
+
+def _denied(
+    table: Array, clock: Array, force: Three, rate: Three, size: GravityReading | None
+) -> bool:
+    """Whether the device turns, and not as columns that may be its rates say."""
+    acc, gyr = table[:, list(force)], table[:, list(rate)]
+    return size is not None and turns_deny(
+        _scaled_to_10_ms_steps(clock), acc, gyr, size
+    )
 
 
 def _scattered(values: Array, size: float) -> bool:

@@ -168,6 +168,16 @@ def test_hexadecimal_counts_keep_their_sign(counts: list[int]) -> None:
     )
 
 
+def test_a_column_filled_with_zeros_is_as_hexadecimal_as_the_others() -> None:
+    text = ["1000 0312 FE64 FFFFFFE8 001A 00B0", "1010 0313 FE64 0002 FFFFFFFF 00B0"]
+    form = HexCells.of(text * 3, None)
+    assert form is not None
+    assert [[int(c) for c in line.split()] for line in form.reader()(text)] == [
+        [1000, 0x312, -0x19C, -24, 26, 0xB0],
+        [1010, 0x313, -0x19C, 2, -1, 0xB0],
+    ]
+
+
 @given(
     st.lists(st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=3), min_size=2),
     st.sampled_from(["[]", "()", "{}"]), st.sampled_from([", ", " ", ","]),

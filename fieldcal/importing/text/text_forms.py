@@ -10,6 +10,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     angular_velocity:\n  x: 0.1        messages as ROS shows them
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
     FF3A 0012                          counts in hexadecimal digits
+    gscale,0.0005                      counts below lines that say what one of them is
     2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
     23:59:50.7, 0.1, 0.2               ms behind the seconds without their zeros: 50.007
 
@@ -41,6 +42,7 @@ from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, End
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
+from fieldcal.importing.text.scaled_counts import ScaledCounts
 from fieldcal.importing.text.tagged_lines import TaggedLines
 from fieldcal.importing.text.text_form import (
     MOSTLY,
@@ -288,8 +290,9 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, LabviewText, RateOnTop, ReceiverLines, VectorNavLines, CheckedLines,
-    EchoedMessages, EndedLines, DatabasePoints, QuotedCells, FortranNumbers, UnitCells,
+    DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
+    CheckedLines, EchoedMessages, EndedLines, DatabasePoints, QuotedCells,
+    FortranNumbers, UnitCells,
     LongTable, LabelledValues, BarTable, ListCells,
     TaggedLines, ArrivalPrefix, HexCells, BareFractions, ClockColumn,
 )  # fmt: skip

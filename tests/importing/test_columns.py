@@ -360,6 +360,22 @@ def test_rows_between_the_steps_of_a_clock_are_kept(
     assert np.abs(session.block.t - rows[:, 0]).max() < 0.01
 
 
+def test_rows_that_arrive_together_now_and_then_are_kept(tmp_path: Path) -> None:
+    rows = turned(6, 100.0)
+    late = np.arange(len(rows)) // 20 * 20 + 15
+    waits = (np.arange(len(rows)) % 20 >= 13) & (np.arange(len(rows)) < late)
+    came = rows[
+        np.where(waits, np.minimum(late, len(rows) - 1), np.arange(len(rows))), 0
+    ]
+    path = write(
+        tmp_path, np.column_stack([came, rows[:, 1:]]), heading="t,ax,ay,az,gx,gy,gz"
+    )
+    session = imported(path)
+    assert len(session.block) == len(rows)
+    assert np.abs(session.block.t - rows[:, 0]).max() < 0.03
+    np.testing.assert_allclose(session.block.acc, rows[:, 1:4], atol=1e-6)
+
+
 def test_rows_of_which_now_more_now_fewer_share_a_time_are_asked_about(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

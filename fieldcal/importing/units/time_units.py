@@ -48,9 +48,9 @@ SHARED, TOGETHER, REGULAR = 0.5, 0.1, 0.9
 """Part of the rows that come with the row before, of a clock too coarse; the part of
 the mean step by which they follow; and of batches that have as many rows."""
 
-COARSE, MOST_TICKS = 0.01, 4.0
-"""Part of the rows that have the time of the row before, of a clock that is too coarse,
-and fewer of its steps than these from row to row."""
+COARSE = 0.01
+"""Part of the rows that have the time of the row before, of a clock that is too coarse
+or that tells when several rows came."""
 
 JITTER = 0.5
 """Quartiles of the steps of a sensor's clock differ by a smaller part of the step;
@@ -261,9 +261,7 @@ def shared_times(t: Array) -> SharedTimes | None:
 
 
 def coarse_tick(t: Array) -> float:
-    """Step of a clock with times (n,) that some rows share; 0 of a finer one.
-
-    Of two samples that came at once by a finer clock, the times are those of arrival.
+    """Step of a clock with times (n,) that some rows share; 0 of another.
 
     >>> coarse_tick(np.floor(np.arange(100) / 1.3)), coarse_tick(np.arange(100.0))
     (1.0, 0.0)
@@ -271,9 +269,7 @@ def coarse_tick(t: Array) -> float:
     steps = np.diff(t[np.isfinite(t)])
     if len(steps) < MIN_ROWS or not COARSE <= float((steps == 0).mean()) < SHARED:
         return 0.0
-    own = steps[steps > 0]
-    tick = float(np.quantile(own, COARSE))
-    return tick if float(np.median(own)) < MOST_TICKS * tick else 0.0
+    return float(np.quantile(steps[steps > 0], COARSE))
 
 
 def time_units_of_bursts(t: Array) -> list[str]:

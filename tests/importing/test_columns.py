@@ -360,6 +360,40 @@ def test_rows_between_the_steps_of_a_clock_are_kept(
     assert np.abs(session.block.t - rows[:, 0]).max() < 0.01
 
 
+@pytest.mark.parametrize("name", ["delta_ms", "interval (ms)", "dt_ms"])
+def test_the_time_since_the_row_before_is_no_time_of_day(
+    tmp_path: Path, name: str
+) -> None:
+    rows = turned(6, 50.0)
+    since = np.column_stack([np.full(len(rows), 20.0), rows[:, 1:]])
+    path = write(tmp_path, since, heading=f"{name},ax,ay,az,gx,gy,gz")
+    assert_same(imported(path), rows)
+
+
+def test_a_file_of_one_sensor_may_begin_with_its_times(tmp_path: Path) -> None:
+    """Without names, and joined by what the files are called."""
+    rows = turned(6, 50.0)
+    for name, own in (("accelerometer", [0, 1, 2, 3]), ("gyro", [0, 4, 5, 6])):
+        write(tmp_path, rows[:, own], name=f"{name}.csv")
+    files = [str(tmp_path / f"{name}.csv") for name in ("accelerometer", "gyro")]
+    out = tmp_path / "out"
+    assert main(["import", *files, "--join", "-o", str(out)]) == 0
+    assert_same(Session.open(out), rows)
+
+
+def test_the_rate_is_asked_with_the_scale_that_usually_stands_beside(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(6, 50.0)
+    counts = np.hstack([rows[:, 1:4] / 9.80665 * 800, 10 * np.rad2deg(rows[:, 4:])])
+    path = write(tmp_path, np.round(counts), heading="ax,ay,az,gx,gy,gz")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    said = re.search(
+        r"--rate ([\d.]+), which .* counts, 10 in", capsys.readouterr().err
+    )
+    assert said is not None and abs(float(said[1]) - 50) < 1
+
+
 def test_rows_that_arrive_together_now_and_then_are_kept(tmp_path: Path) -> None:
     rows = turned(6, 100.0)
     late = np.arange(len(rows)) // 20 * 20 + 15

@@ -46,6 +46,14 @@ def test_angles_are_no_accelerations(tmp_path: Path) -> None:
         read_files([path])
 
 
+def test_rows_of_zeros_are_no_other_length(tmp_path: Path) -> None:
+    rows = turned(2, 50.0)
+    rows[:150, 1:] = 0
+    path = write(tmp_path, rows, heading="t,ax,ay,az,gx,gy,gz")
+    with pytest.raises(InputError, match="hold only zeros"):
+        read_files([path])
+
+
 def test_gravity_with_any_bias_has_one_length() -> None:
     rows = turned(2, 50.0)[:, 1:4]
     for bias in ([0, 0, 0], [2.4, 0, 0], [0, -1.5, 1.5]):

@@ -109,9 +109,9 @@ def unequal_lengths(acc: Array) -> tuple[float, float] | None:
     """Lengths that numbers (n, 3) have where they change least, if (1) fits none.
 
     Gravity is the same at every rest. None if they are alike, lie on a sphere, or are
-    too few to tell.
+    too few to tell. Rows of zeros hold nothing.
     """
-    acc = _readings(acc)
+    acc = _readings(acc[acc.any(axis=1)])
     if len(acc) < MIN_ROWS or are_means(acc):
         return None
     quiet = _quiet_means(acc)

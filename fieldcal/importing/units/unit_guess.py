@@ -219,7 +219,8 @@ class _Guess:
                 f" calibrated by them; {LOG_GRAVITY}, or, if it is so, add"
                 f" --acc-unit g --acc-lsb {rounded_text(gravity.size)}"
             )
-        if self._alone and (lengths := unequal_lengths(acc - self._zero)) is not None:
+        whole = acc[acc.any(axis=1)] - self._zero
+        if self._alone and (lengths := unequal_lengths(whole)) is not None:
             low, high = (rounded_text(one, 2) for one in lengths)
             self._ask(
                 f"|a| where it changes least is {low} to {high}, and gravity is the"

@@ -81,7 +81,9 @@ def test_a_rate_above_the_numbers_is_taken(
     rows = turned(3, 50.0)
     top = "Fs,50\nLogging Type,0\nax,ay,az,gx,gy,gz"
     assert_same(imported(write(tmp_path, rows[:, 1:], heading=top)), rows)
-    assert "it says the rate: 'Fs,50'" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "it says the rate: 'Fs,50'" in said
+    assert "--columns ax,ay,az,gx,gy,gz\n" in said
 
 
 @pytest.mark.parametrize(

@@ -99,6 +99,43 @@ def hexadecimal() -> str:
     return lines(T * 1e3, rows, head="ms,ax,ay,az,gx,gy,gz")
 
 
+def hexadecimal_of_c() -> str:
+    """As ``%04X`` writes numbers of 32 bits, below lines of comment."""
+    counts = np.round(np.hstack([A * 2048 / G, DEG * 16.384])).astype(int)
+    rows = [",".join(f"{x & 0xFFFFFFFF:04X}" for x in row) + " " for row in counts]
+    return "\n".join(["// Sample rate: 50.0Hz", "// Scenario: 4", SIX, *rows])
+
+
+def described() -> str:
+    """Lines of several kinds, of which others say the names and units."""
+    found = ["$FLYS,1", "$VAR,FIRMWARE_VER,v1", "$COL,BARO,time,pressure",
+             "$UNIT,BARO,s,Pa", "$COL,IMU,time,wx,wy,wz,ax,ay,az",
+             "$UNIT,IMU,s,deg/s,deg/s,deg/s,g,g,g", "$DATA"]  # fmt: skip
+    for i, (t, a, w) in enumerate(zip(T, A / G, DEG, strict=True)):
+        found += [f"$BARO,{t + 0.002:.3f},1013{i:.2f}"] if i % 10 == 0 else []
+        found.append(f"$IMU,{t:.3f}," + ",".join(f"{x:.9g}" for x in (*w, *a)))
+    return "\n".join(found)
+
+
+def scaled() -> str:
+    """Counts below their scales, which are none of a usual full scale."""
+    counts = np.round(np.hstack([W / 1.1e-4, A / G / 3.3e-4])).astype(int)
+    rows = [f"{round(t * 1e4)}," + ",".join(map(str, row))
+            for t, row in zip(T.tolist(), counts.tolist(), strict=True)]  # fmt: skip
+    head = ["LOG", "version,1.1", "orientation,YxZ", "tscale,0.0001", "gscale,1.1e-4",
+            "ascale,0.00033", "t,gx,gy,gz,ax,ay,az"]  # fmt: skip
+    return "\n".join([*head, *rows])
+
+
+def behind_brackets() -> str:
+    found = []
+    for t, a, w in zip(T.tolist(), A.tolist(), W.tolist(), strict=True):
+        said = {f"{k}.{x}": v for k, three in (("acc", a), ("gyro", w))
+                for x, v in zip("xyz", three, strict=True)}  # fmt: skip
+        found.append(f"[{UNIX + t:.6f}][{134537 + round(1e3 * t)}][IMU]: {said}")
+    return "\n".join(found)
+
+
 def again() -> str:
     rows, names = lines(ROWS).split("\n"), "t,ax,ay,az,gx,gy,gz"
     return "\n".join(["ready", *rows[:3], names, *rows[3:300], names, *rows[300:]])
@@ -146,6 +183,10 @@ FORMS: dict[str, Writer] = {
     "messages as ROS shows them": echoed,
     "lines with a checksum": checked,
     "hexadecimal counts": hexadecimal,
+    "hexadecimal counts of 32 bits": hexadecimal_of_c,
+    "lines that others describe": described,
+    "counts below their scales": scaled,
+    "records behind times in brackets": behind_brackets,
     "names between rows": again,
     "two sensors merged by time": merged_by_time,
     "counts beside what they are": lambda: lines(

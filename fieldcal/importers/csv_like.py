@@ -30,6 +30,7 @@ from fieldcal.importing.headings.sensor_columns import (
 )
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
+from fieldcal.importing.tables.column_times import keeps_growing
 from fieldcal.importing.text.instances import ImuInstances, find_instances
 from fieldcal.importing.text.number_table import NumberTable
 from fieldcal.importing.text.text_form import TextForm
@@ -116,8 +117,8 @@ class TextColumns(ColumnRecording):
         sensor = self.sensor or sensor_of_file_name(self.path.name.split(".")[0])
         if not sensor:
             return found
-        if not found and self._numbers.shape[1] == len(AXES):
-            found = [Heading([Column("", axis) for axis in AXES], SKIP)]
+        if not found and (names := self._three_axes()):
+            found = [Heading([Column("", name) for name in names], SKIP)]
         ways = [
             Heading([of_sensor(sensor, c) for c in way.columns], way.skip)
             for way in found
@@ -126,6 +127,14 @@ class TextColumns(ColumnRecording):
             of_it = f"its axes are those of the {SENSOR[sensor]}, as the file is called"
             self.says += [of_it] if of_it not in self.says else []
         return ways
+
+    def _three_axes(self) -> tuple[str, ...]:
+        """Names for three columns alone, or behind one that is their time."""
+        width = self._numbers.shape[1]
+        grows = [keeps_growing(column) for column in self._numbers.T]
+        if width == len(AXES) + 1 and grows[0] and not any(grows[1:]):
+            return ("t", *AXES)
+        return tuple(AXES) if width == len(AXES) else ()
 
     def imus(self) -> dict[str, ReadOptions]:
         """Options of each IMU by its name; columns may be chosen by their names."""

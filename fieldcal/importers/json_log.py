@@ -42,8 +42,13 @@ CLOCK = "time"
 RECORD = re.compile(rb"\s*\{\s*[\"'].*\}\s*")
 """A line that is a record."""
 
-BEFORE = re.compile(r"([^{\[]*?)\s*(?:->|:)?\s*(\{.*)")
+BEFORE = re.compile(r"((?:\[[^{\[\]]*\]|[^{\[])*?)\s*(?:->|:)?\s*(\{.*)")
 """What stands before a record in its line, and the record."""
+
+PART = re.compile(r"\[([^\[\]]*)\]|([^\[\]\s]+)")
+"""A part of what stands before: in brackets, or a word."""
+
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -118,9 +123,29 @@ def _parse_line(line: str) -> Any:
         return _parse_text(line)
     found = _parse_text(said[2])
     if isinstance(found, dict):
-        clock = said[1].strip(" []")
-        found.setdefault(CLOCK if is_clock(clock) else "topic", clock)
+        for name, value in _said_before(said[1].strip()):
+            found.setdefault(name, value)
     return found
+
+
+def _said_before(text: str) -> Iterator[tuple[str, Any]]:
+    """The time that a text before a record says, and its topic.
+
+    >>> dict(_said_before("[1714746031.25][1250][imu]"))
+    {'time': 1714746031.25, 'topic': 'imu'}
+    """
+    if is_clock(clock := text.strip(" []")):
+        yield CLOCK, clock
+        return
+    if "[" not in text:
+        yield "topic", text
+        return
+    parts = [(one[1] or one[2]).strip() for one in PART.finditer(text)]
+    times = [one for one in parts if is_clock(one) or NUMBER.fullmatch(one)]
+    for one in times[:1]:
+        yield CLOCK, one if is_clock(one) else float(one)
+    if words := [one for one in parts if one not in times]:
+        yield "topic", " ".join(words)
 
 
 def _parse_text(text: str) -> Any:

@@ -109,6 +109,7 @@ class ReadOptions:
     unsigned : kinds of channel (a, g) in 16 bits of which the sign was not read
     reversed : channels whose axis points the other way in the file
     batch : rows that share a time, where they do
+    tick : step of a clock too coarse for its rows, in its unit; 0 of others
     written_again : whether each of them was written several times
     usual : unit of rates that such names of columns have; "" where they tell none
 
@@ -131,6 +132,7 @@ class ReadOptions:
     unsigned: frozenset[str] = frozenset()
     reversed: frozenset[str] = frozenset()
     batch: RowBatch | None = None
+    tick: float = 0.0
     written_again: bool = False
     usual: str = ""
     acc_zero: tuple[float, ...] = ()

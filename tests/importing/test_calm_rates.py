@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joined import read_files
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
@@ -178,3 +179,20 @@ def test_at_a_row_a_second_nothing_is_a_gain(
     said = ["--columns", "t,ax,ay,az,gx,gy,gz", "-o", f"{tmp_path}/out"]
     assert main(["import", str(path), *said]) == 0
     assert "rad/s: it is the usual one" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("lsb", [131.072, 131.0, 65.5, 16.4, 1 / 8.75e-3, 1 / 0.07])
+@pytest.mark.parametrize("unit", ["deg/s", "rad/s"])
+def test_the_steps_of_a_full_scale_tell_the_unit_of_a_calm_device(
+    tmp_path: Path, lsb: float, unit: str
+) -> None:
+    """Quieter than most, so that nothing else speaks against rad/s."""
+    rng = np.random.default_rng(3)
+    counts = np.round([9.0, -4.0, 2.0] + rng.normal(0, 1.2, (400, 3)))
+    rates = counts / lsb * (1.0 if unit == "deg/s" else np.deg2rad(1.0))
+    still = np.array([0.1, -0.2, 9.8]) + rng.normal(0, 0.01, (400, 3))
+    table = np.column_stack([np.arange(400) / 50, still, np.round(rates, 7)])
+    path = write(tmp_path / "log.csv", table, "t,ax,ay,az,gyro_x,gyro_y,gyro_z")
+    found, _ = read_files([path])
+    size = np.deg2rad(counts / lsb)
+    np.testing.assert_allclose(found.gyr, size, rtol=1e-3, atol=2e-7)

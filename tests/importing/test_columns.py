@@ -81,7 +81,9 @@ def test_a_rate_above_the_numbers_is_taken(
     rows = turned(3, 50.0)
     top = "Fs,50\nLogging Type,0\nax,ay,az,gx,gy,gz"
     assert_same(imported(write(tmp_path, rows[:, 1:], heading=top)), rows)
-    assert "it says the rate: 'Fs,50'" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "it says the rate: 'Fs,50'" in said
+    assert "--columns ax,ay,az,gx,gy,gz\n" in said
 
 
 @pytest.mark.parametrize(
@@ -345,6 +347,71 @@ def test_rows_that_share_a_time_are_spread_evenly(
     assert np.ptp(off) < 0.011 and np.abs(np.diff(off)).max() < 0.005
 
 
+@pytest.mark.parametrize("rate", [105.0, 130.0, 190.0])
+def test_rows_between_the_steps_of_a_clock_are_kept(
+    tmp_path: Path, rate: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(6, rate, 1.0)
+    coarse = np.column_stack([np.floor(100 * rows[:, 0]) / 100, rows[:, 1:]])
+    path = write(tmp_path, coarse, heading="time,ax,ay,az,gx,gy,gz")
+    session = imported(path)
+    said = " ".join(capsys.readouterr().err.split())
+    assert "its clock steps by 0.01, and" in said
+    assert "% of its rows have the time of the row before" in said
+    assert len(session.block) == len(rows)
+    assert np.abs(session.block.t - rows[:, 0]).max() < 0.01
+
+
+@pytest.mark.parametrize("name", ["delta_ms", "interval (ms)", "dt_ms"])
+def test_the_time_since_the_row_before_is_no_time_of_day(
+    tmp_path: Path, name: str
+) -> None:
+    rows = turned(6, 50.0)
+    since = np.column_stack([np.full(len(rows), 20.0), rows[:, 1:]])
+    path = write(tmp_path, since, heading=f"{name},ax,ay,az,gx,gy,gz")
+    assert_same(imported(path), rows)
+
+
+def test_a_file_of_one_sensor_may_begin_with_its_times(tmp_path: Path) -> None:
+    """Without names, and joined by what the files are called."""
+    rows = turned(6, 50.0)
+    for name, own in (("accelerometer", [0, 1, 2, 3]), ("gyro", [0, 4, 5, 6])):
+        write(tmp_path, rows[:, own], name=f"{name}.csv")
+    files = [str(tmp_path / f"{name}.csv") for name in ("accelerometer", "gyro")]
+    out = tmp_path / "out"
+    assert main(["import", *files, "--join", "-o", str(out)]) == 0
+    assert_same(Session.open(out), rows)
+
+
+def test_the_rate_is_asked_with_the_scale_that_usually_stands_beside(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(6, 50.0)
+    counts = np.hstack([rows[:, 1:4] / 9.80665 * 800, 10 * np.rad2deg(rows[:, 4:])])
+    path = write(tmp_path, np.round(counts), heading="ax,ay,az,gx,gy,gz")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    said = re.search(
+        r"--rate ([\d.]+), which .* counts, 10 in", capsys.readouterr().err
+    )
+    assert said is not None and abs(float(said[1]) - 50) < 1
+
+
+def test_rows_that_arrive_together_now_and_then_are_kept(tmp_path: Path) -> None:
+    rows = turned(6, 100.0)
+    late = np.arange(len(rows)) // 20 * 20 + 15
+    waits = (np.arange(len(rows)) % 20 >= 13) & (np.arange(len(rows)) < late)
+    came = rows[
+        np.where(waits, np.minimum(late, len(rows) - 1), np.arange(len(rows))), 0
+    ]
+    path = write(
+        tmp_path, np.column_stack([came, rows[:, 1:]]), heading="t,ax,ay,az,gx,gy,gz"
+    )
+    session = imported(path)
+    assert len(session.block) == len(rows)
+    assert np.abs(session.block.t - rows[:, 0]).max() < 0.03
+    np.testing.assert_allclose(session.block.acc, rows[:, 1:4], atol=1e-6)
+
+
 def test_rows_of_which_now_more_now_fewer_share_a_time_are_asked_about(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -378,6 +445,20 @@ def test_axes_without_a_name_beside_gyroscopes_are_asked_about(
     assert "or --columns t,_,_,_,gx,gy,gz" in said
     session = imported(path, "--columns", "t,_,_,_,gx,gy,gz")
     assert np.isnan(session.block.acc).all()
+
+
+@pytest.mark.parametrize("heading", ["", "t,u 0,u 1,u 2,force 0,force 1,force 2"])
+def test_what_does_not_turn_as_gravity_does_is_no_rate(
+    tmp_path: Path, heading: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(3, 50.0)
+    others = np.random.default_rng(3).normal(0, 9.0, (len(rows), 3))
+    others[:, 0] = np.arange(len(rows)) % 256
+    log = np.column_stack([rows[:, 0], others, rows[:, 1:4]])
+    session = imported(write(tmp_path, log, heading=heading))
+    assert "and no others turn as they do" in capsys.readouterr().err
+    assert np.isnan(session.block.gyr).all()
+    np.testing.assert_allclose(session.block.acc, rows[:, 1:4], atol=1e-6)
 
 
 def test_an_axis_that_rests_within_a_step_is_one_of_three(

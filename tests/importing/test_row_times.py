@@ -10,7 +10,12 @@ from hypothesis import strategies as st
 from fieldcal.core.samples import Array
 from fieldcal.importing.recording import ReadOptions, RowBatch
 from fieldcal.importing.tables.column_times import split_seconds
-from fieldcal.importing.times.row_times import BETWEEN, BatchTimes, RowTimes
+from fieldcal.importing.times.row_times import (
+    BETWEEN,
+    BatchTimes,
+    CoarseTimes,
+    RowTimes,
+)
 
 EACH, STEP = 10, 0.1
 """Rows of a batch, and s from one to the next."""
@@ -52,6 +57,21 @@ def test_batches_that_come_late_move_rows_little(seed: int) -> None:
     found = spread(stamps)
     assert (np.diff(found) > 0).all()
     assert np.abs(np.diff(found - taken)).max() < 0.3 * STEP / EACH
+
+
+@given(st.lists(st.integers(0, 2), max_size=60), st.lists(st.integers(0, 60)))
+def test_rows_between_two_steps_of_a_clock_are_in_order(
+    steps: list[int], cuts: list[int]
+) -> None:
+    stamps = np.cumsum([0, *steps]) * STEP
+    edges = [0, *sorted(min(cut, len(stamps)) for cut in cuts), len(stamps)]
+    clock = CoarseTimes(STEP)
+    pieces = [clock.of(stamps[a:b]) for a, b in zip(edges, edges[1:], strict=False)]
+    found = np.concatenate(pieces)
+    np.testing.assert_array_equal(found, CoarseTimes(STEP).of(stamps))
+    late = found - stamps
+    assert (late >= 0).all() and (late <= STEP).all()
+    assert (np.diff(found) >= 0).all()
 
 
 def test_behind_a_pause_it_goes_on_with_the_clock() -> None:

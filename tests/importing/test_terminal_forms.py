@@ -55,11 +55,12 @@ def test_times_that_a_terminal_writes_before_a_line(stamp: str, separator: str) 
     "prefix",
     ["[INFO] [{:.9f}] [imu_node]: ", "[ INFO] [{:.9f}]: ",
      "[00:00:{:06.3f},000] <inf> imu: ", "[{:08.0f}] <inf> imu: ",
-     "05-03 14:20:{:06.3f}  1234  1250 D Imu: "],
-    ids=["ROS 2", "ROS 1", "Zephyr", "Zephyr, ms", "Android"],
+     "05-03 14:20:{:06.3f}  1234  1250 D Imu: ", "[{:.3f}] imu: ",
+     "17000000{:05.2f} [INFO] ", "{:.0f} ms | "],
+    ids=["ROS 2", "ROS 1", "Zephyr", "Zephyr, ms", "Android", "kernel", "Unix", "ms"],
 )  # fmt: skip
 def test_what_a_program_s_log_writes_before_a_line_is_its_time(prefix: str) -> None:
-    ms = "08.0f" in prefix
+    ms = ".0f" in prefix
     stamps = [prefix.format((50 if ms else 0.05) * i) for i in range(ROWS)]
     lines = [f"{stamp}accel: [{', '.join(values(i))}] ax={i}"
              for i, stamp in enumerate(stamps)]  # fmt: skip

@@ -162,6 +162,7 @@ def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
         "Accelerometer data:\nX = {}\nY = {}\nZ = {}\n"
         "Gyroscope data:\nX = {}\nY = {}\nZ = {}\n",
         "accel: {{'x': {}, 'y': {}, 'z': {}}} gyro: {{'x': {}, 'y': {}, 'z': {}}}",
+        "Acc: {{x: {}, y: {}, z: {}}}, Gyro: {{x: {}, y: {}, z: {}}}",
         "🌐 Accel: x:{} y:{} z:{}\n🌐 Gyro: x:{} y:{} z:{}",
         "Temperature 25.31 deg C\nAccel X: {} \tY: {} \tZ: {} m/s^2 \n"
         "Gyro X: {} \tY: {} \tZ: {} radians/s \n",
@@ -181,6 +182,23 @@ def test_values_with_labels_need_no_columns(tmp_path: Path, row: str) -> None:
     np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE, atol=2e-6)
     warm = re.search(r"25\.\d+", row)
     np.testing.assert_array_equal(got.temperature, float(warm[0]) if warm else np.nan)
+
+
+@pytest.mark.parametrize(
+    "stamp", ["%Y-%m-%d-%H-%M-%S:::IMU ", "%Y-%m-%d %H:%M:%S.%f,INFO,"]
+)
+def test_signs_between_a_date_its_time_and_the_labels(
+    tmp_path: Path, stamp: str
+) -> None:
+    row = "accel: [{}, {}, {}] gyro: [{}, {}, {}]"
+    count = 60
+    apart = 20 if "%f" in stamp else 1
+    rows = [
+        f"{when(i * 20 // apart):{stamp}}" + row.format(*values(i % ROWS))
+        for i in range(count)
+    ]
+    got = read(tmp_path, "\n".join(rows) + "\n")
+    np.testing.assert_allclose(got.t, np.arange(count) / apart, atol=2e-6)
 
 
 def test_a_monitor_that_says_when_a_row_came(tmp_path: Path) -> None:

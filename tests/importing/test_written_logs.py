@@ -66,6 +66,23 @@ def test_a_sensor_that_is_slower_than_the_rows_is_read_with_the_other(
     assert "acc bias x" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", ["dt_ms", "delta_ms", "interval (ms)"])
+@pytest.mark.parametrize("since_start", [False, True])
+def test_steps_of_time_that_grow_are_the_time(
+    tmp_path: Path, name: str, since_start: bool
+) -> None:
+    path = tmp_path / "log.csv"
+    t = np.round(ROWS[:, 0] * 1e3)
+    t = t if since_start else np.diff(t, prepend=t[0] - 20)
+    rows = [
+        ",".join(f"{x:.8g}" for x in (ms, *row[1:]))
+        for ms, row in zip(t, ROWS.tolist(), strict=True)
+    ]
+    path.write_text("\n".join([f"{name},{SIX}", *rows]) + "\n")
+    got = Session.open(imported(path)).block
+    np.testing.assert_allclose(got.t - got.t[0], ROWS[:, 0] - ROWS[0, 0], atol=1e-6)
+
+
 def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     rows = ["imu,t,ax,ay,az,gx,gy,gz"]
@@ -166,6 +183,16 @@ def test_hexadecimal_counts_keep_their_sign(counts: list[int]) -> None:
         to_signed_16_bit(np.mod(np.array(counts, dtype=float), 2**16)).tolist()
         == counts
     )
+
+
+def test_a_column_filled_with_zeros_is_as_hexadecimal_as_the_others() -> None:
+    text = ["1000 0312 FE64 FFFFFFE8 001A 00B0", "1010 0313 FE64 0002 FFFFFFFF 00B0"]
+    form = HexCells.of(text * 3, None)
+    assert form is not None
+    assert [[int(c) for c in line.split()] for line in form.reader()(text)] == [
+        [1000, 0x312, -0x19C, -24, 26, 0xB0],
+        [1010, 0x313, -0x19C, 2, -1, 0xB0],
+    ]
 
 
 @given(

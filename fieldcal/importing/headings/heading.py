@@ -91,10 +91,17 @@ class HeadingMatch:
             reversed=wanted.reversed | self.reversed,
         )
 
-    def sentence(self, wanted: ReadOptions) -> str:
-        """Say what is taken from the names, as options that do the same."""
+    def sentence(self, wanted: ReadOptions, rate_said: bool = False) -> str:
+        """Say what is taken from the names, as options that do the same.
+
+        Parameters
+        ----------
+        wanted : the options that are taken
+        rate_said : whether the file says its rate, which no option has to say again
+
+        """
         text = f"--columns {quote(','.join(with_signs(self.columns, self.reversed)))}"
-        if "t" not in self.units and not wanted.rate_hz:
+        if "t" not in self.units and not (wanted.rate_hz or rate_said):
             text += " --rate HZ"
         for kind, (option, given) in {
             "a": ("--acc-unit", wanted.acc_unit),

@@ -33,6 +33,7 @@ from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.importing.units.time_units import (
     RATE_TOLERANCE,
     TICKED,
+    coarse_tick,
     counts_from_long_ago,
     shared_times,
     time_unit_near_rate,
@@ -169,6 +170,14 @@ class ColumnClock:
         if not any(name in at for name in FRACTIONS):
             if (spread := self._spread(wanted, t)) is not None:
                 return replace(spread, written_again=not once.all())
+            if once.all() and not wanted.tick and (tick := coarse_tick(t)):
+                share = 100 * float((np.diff(t) == 0).mean())
+                steps = f"{tick:.6g} {wanted.time_unit}".strip()
+                self._of.says.append(
+                    f"its clock steps by {steps}, and {share:.0f} % of its rows have"
+                    " the time of the row before: they are put between its steps"
+                )
+                wanted = replace(wanted, tick=tick)
         return wanted if wanted.time_unit else self._told(wanted, table, i)
 
     def _spread(self, wanted: ReadOptions, t: Array) -> ReadOptions | None:

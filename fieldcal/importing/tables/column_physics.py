@@ -22,8 +22,9 @@ from fieldcal.importing.units.gravity_size import (
     GravityReading,
     are_means,
     estimate_gravity,
+    unequal_lengths,
 )
-from fieldcal.importing.units.rate_size import estimate_rate_unit
+from fieldcal.importing.units.rate_size import estimate_rate_unit, turns_deny
 from fieldcal.importing.units.scales import (
     ACC_OUT,
     ACC_SCALES,
@@ -244,14 +245,27 @@ def _force_and_rate_triples(
         alone = len(usual) == len(others) == 1
         return ((usual[0], others.pop()), why) if alone else None
     # of counts, any length is one: without a turn they are asked about
-    usual = [three for three in usual if _is_usual_gravity(sizes[three])]
+    usual = [three for three in usual if _is_usual_gravity(sizes[three])
+             and unequal_lengths(table[:, list(three)]) is None]  # fmt: skip
     if len(usual) == 1:
         pairs = [p for p in permutations({*forces, *rates}, 2) if p[0] == usual[0]]
         apart = [rate for _, rate in pairs if not set(rate) & set(usual[0])]
         if len(apart) <= 1 and len({*forces, *rates}) - len(apart) == 1:
             why = "the length of the first three at rest is that of gravity"
+            if apart and _denied(table, clock, usual[0], apart[0], sizes[usual[0]]):
+                return (usual[0], None), f"{why}, and no others turn as they do"
             return (usual[0], apart[0] if apart else None), why
     return None
+
+
+def _denied(
+    table: Array, clock: Array, force: Three, rate: Three, size: GravityReading | None
+) -> bool:
+    """Whether the device turns, and not as columns that may be its rates say."""
+    acc, gyr = table[:, list(force)], table[:, list(rate)]
+    return size is not None and turns_deny(
+        _scaled_to_10_ms_steps(clock), acc, gyr, size
+    )
 
 
 def _scattered(values: Array, size: float) -> bool:

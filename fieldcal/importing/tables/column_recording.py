@@ -145,8 +145,10 @@ class ColumnRecording(Recording):
         if not named:
             raise InputError(self.ask())
         taken = {one.name: one.taken(self.wanted) for one in named}
+        rate = self.rate_said()
         for one in named:
-            alone = [one.sentence(taken[one.name])] if len(named) == 1 else []
+            sentence = one.sentence(taken[one.name], rate is not None)
+            alone = [sentence] if len(named) == 1 else []
             self.says += [s for s in (*alone, *one.says) if s not in self.says]
         return taken
 

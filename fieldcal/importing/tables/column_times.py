@@ -15,7 +15,7 @@ from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
 from fieldcal.importing.times.row_times import FRACTIONS, NEAR_STEPS
 from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit
-from fieldcal.importing.units.scales import MIN_ROWS, USUAL_COUNTS, rounded_text
+from fieldcal.importing.units.scales import MIN_ROWS, counts_beside, rounded_text
 from fieldcal.importing.units.time_units import (
     UNIX,
     SharedTimes,
@@ -245,7 +245,7 @@ def rates_by_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
         fits = {wanted.gyr_unit: 1 / wanted.gyr_scale}
     elif counts:
         # each full scale would be another rate
-        fits = {str(scale): scale.size for scale in USUAL_COUNTS}
+        fits = {str(scale): scale.size for scale in counts_beside(gravity.size)}
     rates = {unit: 100 * reads / one for unit, one in fits.items()}
     sane = {u: rate for u, rate in rates.items() if MIN_RATE_HZ <= rate <= MAX_RATE_HZ}
     if counts:

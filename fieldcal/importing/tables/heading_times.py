@@ -37,7 +37,7 @@ def with_checked_times(way: Heading, table: Array) -> Heading:
     table : (n, k) numbers of the first rows; nan where a cell is none
 
     """
-    way = _with_thermometer(way, table)
+    way = _without_sums(_with_thermometer(way, table), table)
     said = [heading_meaning(column.name, column.unit) for column in way.columns]
     named = [i for i, one in enumerate(said) if one is not None and one.kind == "t"]
     if not named or table.shape[1] != len(way.columns) or not len(table):
@@ -57,6 +57,30 @@ def with_checked_times(way: Heading, table: Array) -> Heading:
     for i in {*named} - {*fit}:
         names[i] = names[i]._replace(name="")
     return Heading(names, way.skip)
+
+
+def _without_sums(way: Heading, table: Array) -> Heading:
+    """A heading in which steps of the time that grow from row to row are the time.
+
+    ``Interval`` is the time since the row before, or since the beginning.
+    """
+    said = [heading_meaning(column.name, column.unit) for column in way.columns]
+    kinds = [one.kind if one is not None else "" for one in said]
+    if table.shape[1] != len(kinds) or "t" in kinds:
+        return way
+    names = [*way.columns]
+    for i, one in enumerate(said):
+        if one is not None and one.kind == "dt" and _grows_each_row(table[:, i]):
+            counts = one.unit is None and is_row_counter(table[:, i])
+            name = "" if counts else "time"
+            names[i] = names[i]._replace(name=name, unit=one.unit or "")
+    return Heading(names, way.skip)
+
+
+def _grows_each_row(column: Array) -> bool:
+    """Whether numbers (n,) keep growing, and not by a late change of the rate."""
+    steps = np.diff(column[np.isfinite(column)])
+    return keeps_growing(column) and bool((steps > 0).mean() > 0.5)
 
 
 def _with_thermometer(way: Heading, table: Array) -> Heading:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Self
 
 from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
@@ -15,6 +15,9 @@ _RULE = re.compile(r"[\s|:+-]*")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LIST = re.compile(rf"[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]")
 _DIGITS = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{2}|[0-9A-Fa-f]{4}|[0-9A-Fa-f]{8})")
+
+WHOLE = 8
+"""Digits of a number of 32 bits."""
 
 MIN_COUNT_COLUMNS = 3
 """Columns of digits that are counts: the axes of a sensor."""
@@ -103,12 +106,16 @@ def _names(row: Sequence[str], many: Sequence[int]) -> list[str]:
 
 
 class HexCells(TextForm):
-    """Counts in hexadecimal digits, of as many bits as there are digits, signed."""
+    """Counts in hexadecimal digits, of as many bits as there are digits, signed.
+
+    Of a column in which negative ones have all 32 bits, the shorter ones are positive,
+    as C writes ``%04X``.
+    """
 
     says = "its counts are in hexadecimal digits, taken as signed"
 
-    def __init__(self, separator: str | None, columns: Sequence[int]) -> None:
-        self._separator, self._columns = separator, tuple(columns)
+    def __init__(self, separator: str | None, columns: Mapping[int, int]) -> None:
+        self._separator, self._columns = separator, dict(columns)
 
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
@@ -119,26 +126,45 @@ class HexCells(TextForm):
         rows = [split_cells(line, parted) for line in lines]
         width = len(rows[-1])
         rows = [row for row in rows if len(row) == width]
-        columns = [i for i in range(width) if _are_digits([row[i] for row in rows])]
-        return cls(parted, columns) if len(columns) >= MIN_COUNT_COLUMNS else None
+        cells = [[row[i] for row in rows] for i in range(width)]
+        found = {i: _digits_in(column) for i, column in enumerate(cells)}
+        sure = [i for i, digits in found.items() if digits]
+        if len(sure) < MIN_COUNT_COLUMNS:
+            return None
+        usual = {len(cell) for i in sure for cell in cells[i]}
+        for i in {*found} - {*sure}:
+            # of an axis at rest all digits may be decimal ones
+            digits = _digits_in(cells[i], filled=True)
+            found[i] = digits if digits in usual else 0
+        return cls(parted, {i: digits for i, digits in found.items() if digits})
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
 
         def one(line: str) -> str:
             row = line.split(self._separator)
-            for i in self._columns:
+            for i, digits in self._columns.items():
                 if i < len(row) and (said := _DIGITS.fullmatch(row[i].strip())):
                     bits, value = 4 * len(said[1]), int(said[1], 16)
-                    row[i] = str(value - (1 << bits if value >> (bits - 1) else 0))
+                    signed = len(said[1]) >= digits and value >> (bits - 1)
+                    row[i] = str(value - (1 << bits if signed else 0))
             return (self._separator or " ").join(row)
 
         return lambda lines: [one(line) for line in lines]
 
 
-def _are_digits(column: Sequence[str]) -> bool:
-    """Whether cells hold hexadecimal digits below a name, not all of them decimal."""
-    said = [m for cell in column if (m := _DIGITS.fullmatch(cell))]
-    alike = len({len(m[1]) for m in said}) == 1
-    letters = any(not is_number(m[0], False) for m in said)
-    return alike and letters and len(said) > len(column) / 2 + 1
+def _digits_in(column: Sequence[str], filled: bool = False) -> int:
+    """How many hexadecimal digits the cells below a name have that may be negative.
+
+    0 where they hold something else; all digits may be decimal ones only if zeros fill
+    them up.
+    """
+    said = [m[1] for cell in column if (m := _DIGITS.fullmatch(cell))]
+    many = {len(one) for one in said}
+    whole = [one for one in said if len(one) == WHOLE]
+    extended = many == {WHOLE // 2, WHOLE} and all(o[0] in "Ff" for o in whole)
+    told = any(not is_number(m, False) for m in said) or (
+        filled and any(one[0] == "0" and one.strip("0") for one in said)
+    )
+    alike = len(many) == 1 or extended
+    return max(many) if alike and told and len(said) > len(column) / 2 + 1 else 0

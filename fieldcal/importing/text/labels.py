@@ -6,7 +6,7 @@
     I (312) IMU: ax=0.1 ay=0.2         2024-05-03 14:20:01,123 INFO acc=(0.1, 0.2, 9.8)
     Accel: x= 0.1 | y= 0.2 | z= 9.8    Acc (mg) [ 10.1, -2.3, 999.1 ], Tmp (C) [ 25.1 ]
     Acceleration in g's  X: 0.1  Y: 0.2  Z: 0.9      ax 0.1 ay 0.2 az 9.8
-    accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}
+    accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}            accel: {x: 0.1, y: 0.2, z: 9.8}
 
 An axis alone belongs to the label before it, which may stand without a value; three
 values behind one label are axes; a unit holds for all axes before it. A time of day at
@@ -51,11 +51,12 @@ _LISTED = re.compile(
 """Values in a list right behind a label or its unit in brackets."""
 
 _DICT = re.compile(
-    r"\{\s*"
-    + r"\s*,\s*".join(rf"['\"]{a}['\"]\s*:\s*({_NUMBER})" for a in AXES)
-    + r"\s*\}"
+    r"[{(]\s*"
+    + r"\s*,\s*".join(rf"['\"]?{a}['\"]?\s*[:=]\s*({_NUMBER})" for a in AXES)
+    + r"\s*[})]",
+    re.IGNORECASE,
 )
-"""Three axes as Python prints them."""
+"""Three axes as Python prints them, or JavaScript."""
 
 _PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{_NUMBER}[\s,;|]*){{3,}}")
 _PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={_NUMBER})")
@@ -89,10 +90,13 @@ _TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
 _PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({_NUMBER})(?:\|\w*)?")
 """A name, ms since 1970 and a value, as Teleplot reads them."""
 
-_LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:-]*")
+_LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*")
 """What programs write behind the time of a line."""
 
-_ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*(?:->|>|:|\s)\s*")
+_ARRIVAL = re.compile(
+    r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*|"
+    r"\d{4}-\d\d-\d\d[-_T ]\d\d-\d\d-\d\d(?:\.\d+)?)\]?\s*(?:->|>|:+|,|\s)\s*"
+)
 
 _NAME = re.compile(r"\W*[A-Za-z][\w-]*:(?!\S)\W*")
 """What stands alone before the first label: a chip or a program."""

@@ -4,6 +4,7 @@
 [00:00:12.345,678] <inf> imu: ax=0.1                     Zephyr
 [00012345] <inf> imu: ax=0.1                             Zephyr, ms since the start
 05-03 14:20:31.123  1234  1250 D Imu: ax=0.1             Android's logcat
+[12.345] imu: ax=0.1        1700000000.123 [INFO] ax=0.1        12345 ms | ax=0.1
 """
 
 from __future__ import annotations
@@ -24,13 +25,18 @@ _FORMS = {
     STAMP: (
         r"\s*\[\s*(?:DEBUG|INFO|WARN(?:ING)?|ERROR|FATAL)\s*\]\s*\[(\d+\.\d+)\]()"
         r"(?:\s*\[[^\]]*\])?:?\s*",
+        r"\s*\[\s*(\d+\.\d+)\]():?\s*(?=[A-Za-z])",
+        r"\s*(\d{9,}\.\d+)()(?=[\s:|,-]+\[?[A-Za-z])[\s:|,-]+",
     ),
     TIME: (
         r"\s*\[(\d+:\d\d:\d\d\.\d{3}),(\d{3})\]\s*<\w+>\s*[\w.-]+:\s*",
         r"\s*(?:\d{4}-)?\d\d-\d\d (\d\d:\d\d:\d\d\.\d+)()\s+\d+\s+\d+\s+[VDIWEF]"
         r" [^:]*:\s*",
     ),
-    TICKS: (r"\s*\[(\d{8,})\]()\s*<\w+>\s*[\w.-]+:\s*",),
+    TICKS: (
+        r"\s*\[(\d{8,})\]()\s*<\w+>\s*[\w.-]+:\s*",
+        r"\s*(\d+)() ?ms\b[\s:|,-]+(?=[A-Za-z])",
+    ),
 }
 """Forms by the name of the time in them, which is in two parts."""
 

@@ -4,6 +4,7 @@
     GPS,0.01,48.1,11.5,512
     ACCE;1.234;0.1;0.2;9.8             accelerometer and gyroscope go together
     GYRO;1.235;0.01;0.02;0.03
+    $COL,IMU,time,wx,wy,wz             names, and units, of the lines $IMU,0.01,...
 
 A line of the gyroscope goes with the nearest of the accelerometer; nothing is
 interpolated.
@@ -13,12 +14,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple, Self
 
 from fieldcal.importing.text.nearest_lines import NearestLines
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
+from fieldcal.importing.words.heading_units import parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 
 SENSORS = {
@@ -37,7 +39,10 @@ PLACES = 3
 MIN_LINES = 2
 """Lines of a kind that is none by chance."""
 
-_WORD = re.compile(r"[^\W\d][^,;\t]*")
+SIGN = "$"
+"""What may stand before the word, as in messages of receivers."""
+
+_WORD = re.compile(r"\$?[^\W\d][^,;\t]*")
 
 
 class LineKind(NamedTuple):
@@ -154,8 +159,25 @@ def _kinds(rows: Sequence[Sequence[str]], place: int) -> list[LineKind]:
                 for row in words if len(row) == width]  # fmt: skip
         own = [row for first, row in said if first == word]
         own += [row for first, row in said if first not in dict(usual)]
+        own += _described(words, word.lstrip(SIGN), width)
         found.append(LineKind(word, width, tuple(own[0]) if own else ()))
     return found
+
+
+def _described(
+    words: Sequence[Sequence[str]], word: str, width: int
+) -> Iterator[Sequence[str]]:
+    """Names of the columns of a kind by a line whose second word is its own.
+
+    A second line of this kind may say the units.
+    """
+    said = [row[1:] for row in words if len(row) == width + 1 and row[1] == word]
+    units = [row for row in said[1:] if any(map(parse_unit, row))]
+    if said and units:
+        yield [f"{name} [{unit}]" if parse_unit(unit) else name
+               for name, unit in zip(said[0], units[0], strict=True)]  # fmt: skip
+    elif said:
+        yield said[0]
 
 
 def _chosen(kinds: Sequence[LineKind]) -> tuple[LineKind | None, LineKind | None]:

@@ -10,7 +10,9 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     angular_velocity:\n  x: 0.1        messages as ROS shows them
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
     FF3A 0012                          counts in hexadecimal digits
+    gscale,0.0005                      counts below lines that say what one of them is
     2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
+    23:59:50.7, 0.1, 0.2               ms behind the seconds without their zeros: 50.007
 
     0.981D+01  9.81 m/s²               numbers as Fortran writes them, or with units
     0.01,ax,0.12                       a line for each value; points of a database
@@ -25,6 +27,7 @@ import csv
 import re
 from collections.abc import Collection, Sequence
 
+from fieldcal.importing.text.bare_fractions import BareFractions
 from fieldcal.importing.text.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.text.dataflash_text import DataflashText
 from fieldcal.importing.text.labels import (
@@ -39,6 +42,7 @@ from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, End
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
+from fieldcal.importing.text.scaled_counts import ScaledCounts
 from fieldcal.importing.text.tagged_lines import TaggedLines
 from fieldcal.importing.text.text_form import (
     MOSTLY,
@@ -286,9 +290,10 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, LabviewText, RateOnTop, ReceiverLines, VectorNavLines, CheckedLines,
-    EchoedMessages, EndedLines, DatabasePoints, QuotedCells, FortranNumbers, UnitCells,
+    DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
+    CheckedLines, EchoedMessages, EndedLines, DatabasePoints, QuotedCells,
+    FortranNumbers, UnitCells,
     LongTable, LabelledValues, BarTable, ListCells,
-    TaggedLines, ArrivalPrefix, HexCells, ClockColumn,
+    TaggedLines, ArrivalPrefix, HexCells, BareFractions, ClockColumn,
 )  # fmt: skip
 """Forms in the order in which they are looked for."""

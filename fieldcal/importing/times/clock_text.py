@@ -36,7 +36,7 @@ _BASIC = re.compile(rf"(\d{{4}}){_DIGITS.format('T')}([.,]\d+)?(\D.*)?")
 _PLAIN = re.compile(rf"(20\d\d){_DIGITS.format('')}([.,]\d+|\d{{3}}|\d{{6}})?()")
 """The same without the T, ``20260314101530250``: no count has such figures in all."""
 
-_DASHED = re.compile(rf"{_DATE}[T _](\d\d)([-.])(\d\d)\3(\d\d(?:[.,]\d+)?)(\D.*)?")
+_DASHED = re.compile(rf"{_DATE}[T _-](\d\d)([-.])(\d\d)\3(\d\d(?:[.,]\d+)?)(\D.*)?")
 """Signs as names of files have them: ``2026-03-14_10-15-30.250``."""
 
 _MINUTES = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d{2}[.,]\d+)")

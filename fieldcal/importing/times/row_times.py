@@ -60,6 +60,38 @@ def clock_numbers(values: Array) -> Array:
     return since
 
 
+class CoarseTimes:
+    """Times of rows of which some have that of the row before: a coarse clock's.
+
+    They go half way to where the clock steps, and the next one half of the rest, so
+    that each is as near to the time that the file says as the clock tells.
+
+    >>> CoarseTimes(1.0).of(np.array([0.0, 0.0, 0.0, 1.0, 2.0, 2.0])).tolist()
+    [0.0, 0.5, 0.75, 1.0, 2.0, 2.5]
+
+    Parameters
+    ----------
+    tick : by which the clock steps, s
+
+    """
+
+    def __init__(self, tick: float) -> None:
+        self._tick, self._last, self._many = tick, np.nan, 0
+
+    def of(self, t: Array) -> Array:
+        """Times (n,) of the next rows, s."""
+        same = t == np.concatenate([[self._last], t[:-1]])
+        at = np.arange(len(t))
+        first = np.maximum.accumulate(np.where(same, -1, at))
+        many = at - first
+        # those of the piece before go on
+        many[first < 0] += self._many
+        if len(t):
+            self._last, self._many = float(t[-1]), int(many[-1])
+        found: Array = t + self._tick * (1 - 0.5**many)
+        return found
+
+
 class BatchTimes:
     """Times of rows that share those of their batch, spread evenly over it.
 
@@ -119,7 +151,11 @@ class RowTimes:
         self._anew: list[float] = []
         self._began = np.nan
         self._unsure: tuple[float, float] | None = None
-        self._spread = BatchTimes(wanted.batch) if wanted.batch else None
+        self._spread: BatchTimes | CoarseTimes | None = None
+        if wanted.batch:
+            self._spread = BatchTimes(wanted.batch)
+        elif wanted.tick:
+            self._spread = CoarseTimes(wanted.tick * wanted.time_scale)
 
     def of(self, columns: Mapping[str, Array], n: int) -> Array:
         """Times (n,) of the next rows."""

@@ -29,6 +29,16 @@ AS_SHOWN = 1.5
 """How many times what gravity turns at most rates say in their own unit: of mrad/s,
 deg/s would say some ten times as much."""
 
+FEWEST_STEPS = 2
+"""Steps of an axis that tell by how much it steps."""
+
+SAME_STEP, OFF_STEP = 1.02, 0.1
+"""Ratio within which steps are the same, and part of a step by which a number that was
+rounded to some decimals is off one."""
+
+DECIMAL = (1.0, 2.0, 5.0)
+"""First digit of steps that are those of decimals."""
+
 RAD, DEG = GYR_SCALES[:2]
 
 
@@ -70,6 +80,9 @@ def guess_unit_of_calm_rates(
     first = plain[0]
     if step is not None and allowed:
         return CalmRateUnit(allowed[0], "so are the accelerations, and no turn tells")
+    stepped = None if whole else unit_of_steps(gyr)
+    if stepped is not None and stepped.scale in allowed:
+        return stepped
     if usual and first in allowed:
         return CalmRateUnit(first, "so rates of such names are, and no turn tells")
     if not whole and turns is not None and _in_degrees(turns):
@@ -81,6 +94,47 @@ def guess_unit_of_calm_rates(
     shown = f"{fast:.4g}" if fast > MAX_REST_RATE else f"a scatter of {noise:.2g}"
     asks = f"nothing says the unit of its rates, and {shown} rad/s is no rest"
     return CalmRateUnit(None, "", asks, tuple(_answers(gyr, turns, whole)))
+
+
+def unit_of_steps(gyr: Array) -> CalmRateUnit | None:
+    """The unit in which rates (n, 3) step as those of a usual full scale do.
+
+    None where they do not, or by a decimal digit. No step in deg/s is one in rad/s.
+
+    >>> counts = np.array([[3.0, -2.0, 0.0], [5.0, 1.0, 1.0], [4.0, 0.0, 4.0]] * 20)
+    >>> unit_of_steps(counts / 131).scale.unit
+    'deg/s'
+    >>> unit_of_steps(np.deg2rad(0.07 * counts)).scale.unit
+    'rad/s'
+    >>> unit_of_steps(0.01 * counts) is None
+    True
+    """
+    steps = [step for axis in gyr.T if (step := _step(axis))]
+    if not steps or max(steps) > SAME_STEP * min(steps):
+        return None
+    step = float(np.median(steps))
+    for scale in (DEG, RAD):
+        for full in GYR_SCALES:
+            own = scale.size / full.size
+            if full.lsb != 1 and abs(np.log(step / own)) < np.log(SAME_STEP):
+                why = f"its steps of {step:.4g} are those of {full.lsb:.6g} counts in a"
+                return CalmRateUnit(scale, f"{why} deg/s, and no turn tells")
+    return None
+
+
+def _step(axis: Array) -> float:
+    """By how much numbers (n,) step; 0 where they do not, or by a decimal digit."""
+    values = np.unique(axis)
+    apart = np.diff(values)
+    if len(apart) < FEWEST_STEPS:
+        return 0.0
+    step = float(np.median(apart[apart < SAME_STEP * apart.min()]))
+    many = (values - values[0]) / step
+    if np.abs(many - np.round(many)).max() > OFF_STEP:
+        return 0.0
+    digits = float(f"{step:.1e}".partition("e")[0])
+    decimal = abs(step / float(f"{step:.0e}") - 1) < 1e-3
+    return 0.0 if decimal and digits in DECIMAL else step
 
 
 def _in_degrees(turns: TurnComparison) -> bool:

@@ -44,6 +44,10 @@ _WIDE = 0.05
 """Least share of the directions' variance along any axis, for a sphere."""
 
 
+_UNEQUAL = 5 / 3
+"""Ratio of lengths at rest that no bias makes, which is a quarter of g at most."""
+
+
 class GravityReading(NamedTuple):
     """Gravity as the accelerometers read it, in numbers of the file.
 
@@ -99,6 +103,22 @@ def estimate_gravity(acc: Array) -> GravityReading | None:
     return _gravity_of(
         _quiet_means(acc) if len(acc) >= MIN_ROWS else acc[:MIN_ROWS_ALONE]
     )
+
+
+def unequal_lengths(acc: Array) -> tuple[float, float] | None:
+    """Lengths that numbers (n, 3) have where they change least, if (1) fits none.
+
+    Gravity is the same at every rest. None if they are alike, lie on a sphere, or are
+    too few to tell. Rows of zeros hold nothing.
+    """
+    acc = _readings(acc[acc.any(axis=1)])
+    if len(acc) < MIN_ROWS or are_means(acc):
+        return None
+    quiet = _quiet_means(acc)
+    low, high = np.quantile(np.linalg.norm(quiet, axis=1), (0.1, 0.9)).tolist()
+    if high <= _UNEQUAL * low or _fit_sphere(quiet)[1]:
+        return None
+    return low, high
 
 
 def _quiet_means(acc: Array) -> Array:

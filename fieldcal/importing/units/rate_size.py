@@ -79,6 +79,21 @@ def estimate_rate_unit(
     return rough if closes is None and agrees >= _AGREES else closes
 
 
+def turns_deny(t: Array, acc: Array, gyr: Array, gravity: GravityReading) -> bool:
+    """Whether gravity turns, and nothing like numbers (n, 3) that may be rates.
+
+    Parameters
+    ----------
+    t, acc, gyr, gravity : as of `estimate_rate_unit`
+
+    """
+    sides = _Sides.of(t, acc, gyr, gravity)
+    if sides is None or sides.moved < TURNED**2 * sides.lag:
+        return False
+    both = float(sides.left.ravel() @ sides.right.ravel())
+    return both < _ROUGHLY * float(np.sqrt((sides.right**2).sum() * sides.moved))
+
+
 class TurnComparison(NamedTuple):
     """Rms turn of gravity within half a second, rad, by rates and by accelerometers.
 

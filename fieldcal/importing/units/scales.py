@@ -49,11 +49,15 @@ def _counts_per_unit(per_unit: float, bits: int = 16) -> float:
     return 2.0 ** (bits - 1) / per_unit
 
 
+ANALOG = ((800.0, 10.0), (800.0 * 2**16, 10.0 * 2**16))
+"""Counts in a g, and in a deg/s beside them, of sensors of Analog Devices in 16 and 32
+bits."""
+
 _G_COUNTS = (
     *(_counts_per_unit(full) for full in (2, 3, 4, 6, 8, 12, 16, 24, 32)),
     *(512.0, 256.0, 128.0, 64.0),
     _counts_per_unit(16, 20),
-    *(800.0, 800.0 * 2**16),
+    *(acc for acc, _ in ANALOG),
 )
 """Full scales in 16 bits, of 10 to 13 bits, of high resolution in 20 bits, and of the
 sensors of Analog Devices in 16 and 32 bits. Not 65536: about so reads the length of
@@ -63,9 +67,21 @@ _DEG_COUNTS = (
     *(_counts_per_unit(full) for full in (125, 250, 500, 1000, 2000)),
     *(1 / milli for milli in (8.75e-3, 17.5e-3, 35e-3, 70e-3)),
     _counts_per_unit(1000, 20),
-    *(10.0, 10.0 * 2**16),
+    *(gyr for _, gyr in ANALOG),
 )
 """Full scales in 16 bits, ST's sensitivities, and others as of accelerations."""
+
+
+def counts_beside(size: float) -> tuple[Scale, ...]:
+    """Scales of rates in counts that usually stand beside so many counts in a g.
+
+    >>> [scale.lsb for scale in counts_beside(803.0)][:2], counts_beside(16384.0)[0].lsb
+    ([10.0, 131.072], 131.072)
+    """
+    own = [Scale(gyr * 180 / np.pi, "deg/s", gyr) for acc, gyr in ANALOG
+           if abs(np.log(size / acc)) < ACC_OUT[0]]  # fmt: skip
+    return (*own, *USUAL_COUNTS)
+
 
 USUAL_COUNTS = tuple(
     Scale(_counts_per_unit(full) * 180 / np.pi, "deg/s", _counts_per_unit(full))

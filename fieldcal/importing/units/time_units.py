@@ -48,6 +48,10 @@ SHARED, TOGETHER, REGULAR = 0.5, 0.1, 0.9
 """Part of the rows that come with the row before, of a clock too coarse; the part of
 the mean step by which they follow; and of batches that have as many rows."""
 
+COARSE = 0.01
+"""Part of the rows that have the time of the row before, of a clock that is too coarse
+or that tells when several rows came."""
+
 JITTER = 0.5
 """Quartiles of the steps of a sensor's clock differ by a smaller part of the step;
 those of arrivals, of rows that wait for each other, by more."""
@@ -254,6 +258,18 @@ def shared_times(t: Array) -> SharedTimes | None:
     even = float((np.abs(rows - usual) <= 1).mean()) >= REGULAR
     equal = float((steps == 0).mean()) > SHARED
     return SharedTimes(float(np.median(np.diff(t[begins + 1]))), usual, even, equal)
+
+
+def coarse_tick(t: Array) -> float:
+    """Step of a clock with times (n,) that some rows share; 0 of another.
+
+    >>> coarse_tick(np.floor(np.arange(100) / 1.3)), coarse_tick(np.arange(100.0))
+    (1.0, 0.0)
+    """
+    steps = np.diff(t[np.isfinite(t)])
+    if len(steps) < MIN_ROWS or not COARSE <= float((steps == 0).mean()) < SHARED:
+        return 0.0
+    return float(np.quantile(steps[steps > 0], COARSE))
 
 
 def time_units_of_bursts(t: Array) -> list[str]:

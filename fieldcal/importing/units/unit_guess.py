@@ -23,6 +23,7 @@ from fieldcal.importing.units.gravity_size import (
     are_means,
     estimate_gravity,
     gravity_of_length,
+    unequal_lengths,
 )
 from fieldcal.importing.units.rate_size import compare_turns, estimate_rate_unit
 from fieldcal.importing.units.scales import (
@@ -66,6 +67,10 @@ OFFSET = 0.25
 """Part of g that no bias is: what raw counts show more is where their zero lies."""
 
 
+PLAIN_UNITS = ["--acc-unit m/s^2", "--acc-unit g"]
+"""What accelerations are in, where their lengths tell nothing."""
+
+
 class AssumedUnits(NamedTuple):
     """Assumptions about units that nobody stated.
 
@@ -96,7 +101,8 @@ def settle_units(recording: Recording, stream: str) -> AssumedUnits:
     if not all(part.asks_units for part in parts):
         check_format_units(recording, block)
         return AssumedUnits(heard.guessed)
-    guess = _Guess(str(recording.path), _stated_units(parts), block)
+    alone = len(parts) == 1
+    guess = _Guess(str(recording.path), _stated_units(parts), block, alone)
     if guess.said.acc_unit not in UNSCALED and guess.acc_bias is None:
         check_one_unit(parts)
     for part in parts:
@@ -133,6 +139,11 @@ def _stated_units(parts: Sequence[Recording]) -> ReadOptions:
 class _Guess:
     """Units of the beginning of a recording.
 
+    Parameters
+    ----------
+    name, said, block : of the recording, what is said of it, and its beginning
+    alone : whether it is one file: those of several may be in different units
+
     Attributes
     ----------
     found : what was guessed, by quantity
@@ -142,7 +153,10 @@ class _Guess:
 
     """
 
-    def __init__(self, name: str, said: ReadOptions, block: Block) -> None:
+    def __init__(
+        self, name: str, said: ReadOptions, block: Block, alone: bool = True
+    ) -> None:
+        self._alone = alone
         self.found: dict[str, str] = {}
         self.acc_bias: list[float] | None = None
         self.doubts: list[str] = []
@@ -204,6 +218,17 @@ class _Guess:
                 " to be taken out of these accelerations, and nothing can be"
                 f" calibrated by them; {LOG_GRAVITY}, or, if it is so, add"
                 f" --acc-unit g --acc-lsb {rounded_text(gravity.size)}"
+            )
+        whole = acc[acc.any(axis=1)] - self._zero
+        if self._alone and (lengths := unequal_lengths(whole)) is not None:
+            low, high = (rounded_text(one, 2) for one in lengths)
+            self._ask(
+                f"|a| where it changes least is {low} to {high}, and gravity is the"
+                " same everywhere: it may be taken out of these accelerations, and"
+                f" nothing can be calibrated by them then ({LOG_GRAVITY}); if it is"
+                " not, say the unit",
+                (unit_options("acc", fits, "g", 1) if fits else PLAIN_UNITS)
+                + zero_options(self.said, gravity),
             )
         if len(fits) != 1:
             self._ask(

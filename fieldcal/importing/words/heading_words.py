@@ -69,6 +69,9 @@ _STEPS = (("dt",), ("delta", "t"), ("delta", "time"), ("time", "delta"), ("delta
           ("time", "step"), ("sample", "interval"))  # fmt: skip
 """Names of the time that passed since the row before."""
 
+_BARE_STEPS = (("delta",), ("interval",))
+"""Likewise where a unit of time stands beside them."""
+
 _TEMPERATURES = ("temp", "temperature", "tmp", "temper", "temperatur", "temperatura",
                  "温度")  # fmt: skip
 _WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world",
@@ -309,11 +312,12 @@ def _with_axis(
 
 def _step_meaning(words: list[str], unit: str | None) -> HeadingMeaning | None:
     """The meaning of the time since the row before."""
-    for names in _STEPS:
+    for names in (*_STEPS, *_BARE_STEPS):
         if (at := _find_phrase(words, names)) is not None:
             rest = words[:at] + words[at + len(names) :]
             inner = [u for w in rest if (u := parse_unit(w)) in UNITS["dt"]]
-            if len(inner) == len(rest):
+            timed = names in _STEPS or bool(inner) or unit in UNITS["dt"]
+            if len(inner) == len(rest) and timed:
                 return HeadingMeaning("dt", "", unit or (inner[-1] if inner else None))
     return None
 

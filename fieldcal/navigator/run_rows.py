@@ -29,6 +29,11 @@ START_POSITION_M = 10.0
 """Standard deviation of the first position, m: it is noisy."""
 
 
+ROUNDING = 1e-12
+"""Share of a row's variance that is its own: with runs that scatter by far more than
+their outputs are noisy, rounding leaves no positive definite matrix."""
+
+
 @dataclass(frozen=True, slots=True)
 class RunSetup:
     """What is known of the site and of the attitudes of the runs.
@@ -85,7 +90,9 @@ class RunRows:
         """Covariance of the rows for N_a, N_g, q_v, q_p, J, (n, n)."""
         turned = self.attitude_design @ self.attitude_design.T
         whole = self.attitude_sigma**2 * turned + self.start_covariance
-        return np.asarray(whole + np.tensordot(noise**2, self.noise_parts, 1))
+        whole += np.tensordot(noise**2, self.noise_parts, 1)
+        whole.flat[:: len(whole) + 1] *= 1 + ROUNDING
+        return np.asarray(whole)
 
     @property
     def noise_parts(self) -> Array:

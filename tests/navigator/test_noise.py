@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fieldcal.navigator.estimate import NOISE_LEAST, NOISE_MOST
 from fieldcal.navigator.run_rows import (
     RunRows,
     RunSetup,
@@ -64,3 +65,13 @@ def test_slopes_are_those_of_the_evidence(which: int) -> None:
     slope = evidence_slopes(rows, run_posterior(rows, SIZES, noise), noise)[which]
     assert abs(slope) > 1e-3
     assert slope == pytest.approx((above - below) / 2e-4, rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("which", range(5))
+def test_any_noise_within_its_bounds_has_an_evidence(which: int) -> None:
+    """Where one is as large as it may be, and all others are as small."""
+    noise = np.array(NOISE_LEAST)
+    noise[which] = NOISE_MOST[which]
+    rows = rows_of(0.01)
+    found = run_posterior(rows, SIZES, noise)
+    assert np.isfinite([found.score, *evidence_slopes(rows, found, noise)]).all()

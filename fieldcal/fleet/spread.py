@@ -28,7 +28,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array
@@ -86,7 +86,7 @@ class UnitDistribution:
     def tail_probabilities(self, x: Array) -> Array:
         """Probability of a deviation of this size or more, (n,), by Student's t."""
         dof = max(float(self.typical_probability.sum()) - 1.0, 1.0)
-        out: Array = 2 * student.sf(np.abs(x - self.mean) / self.sigma, dof)
+        out: Array = 2 * stdtr(dof, -np.abs(x - self.mean) / self.sigma)
         return out
 
 

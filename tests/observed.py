@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from fieldcal.calibration import Nominal
@@ -31,19 +32,26 @@ COUPLING = np.array([[0.0, -0.008, 0.002], [0.006, 0.0, 0.003], [-0.004, 0.007, 
 GYR_BIAS = np.array([0.011, -0.032, 0.0021])
 
 
-def carried(alpha: float, beta: float, vector: Sequence[float]) -> Array:
-    """Components of a vector in a frame turned by alpha about z, beta about x."""
-    seen = Rotation.from_euler("z", -alpha).apply(vector)
-    return np.asarray(Rotation.from_euler("x", -beta).apply(seen))
+def carried(alpha: float | Array, beta: float | Array, vector: ArrayLike) -> Array:
+    """Components of a vector in a frame turned by alpha about z, beta about x.
+
+    Of n angles, of n vectors or of both, (n, 3).
+    """
+    seen = Rotation.from_rotvec(np.multiply.outer(-alpha, [0, 0, 1])).apply(vector)
+    turn = Rotation.from_rotvec(np.multiply.outer(-beta, [1, 0, 0]))
+    return np.asarray(turn.apply(seen))
 
 
 def force(
     alpha: float, beta: float, offset: Sequence[float] = (0, 0),
-    base: Sequence[float] = (0, 0), g: float = G,
+    base: Sequence[float] | Array = (0, 0), g: float = G,
 ) -> Array:  # fmt: skip
-    """Specific force at rest, angles in rad; the tilt is (alpha0, beta0) or (x, z)."""
+    """Specific force at rest, angles in rad; the tilt is (alpha0, beta0) or (x, z).
+
+    (n, 3) if each of x and z are n values.
+    """
     home = carried(base[1], base[0], [0, -g, 0])
-    return carried(alpha + offset[0], beta + offset[1], home.tolist())
+    return carried(alpha + offset[0], beta + offset[1], home)
 
 
 def outputs(

@@ -45,17 +45,18 @@ def schedule(start: float = 3.0) -> list[dict[str, float]]:
     ]
 
 
-def _axes(alpha: float, beta: float) -> Any:
-    """Rows are the axes of the turned device in the base."""
+def _axes(alpha: Any, beta: Any) -> Any:
+    """Rows are the axes of the turned device in the base, (n, 3, 3)."""
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
-    about_z = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cb, sb], [0.0, -sb, cb]])
-    return about_x @ about_z
+    no, one = np.zeros_like(alpha), np.ones_like(alpha)
+    about_z = np.array([[ca, sa, no], [-sa, ca, no], [no, no, one]])
+    about_x = np.array([[one, no, no], [no, cb, sb], [no, -sb, cb]])
+    return np.moveaxis(about_x, 2, 0) @ np.moveaxis(about_z, 2, 0)
 
 
 def _angles(t: Any, knots: list[float], columns: Any) -> Any:
-    """Alpha and beta at some times, rad."""
-    return np.deg2rad([np.interp(t, knots, column) for column in columns]).T
+    """Alpha and beta at some times, (2, n) rad."""
+    return np.deg2rad([np.interp(t, knots, column) for column in columns])
 
 
 def attitude(off: float = 0.0, start: float = 3.0) -> tuple[Any, Any]:
@@ -70,7 +71,7 @@ def attitude(off: float = 0.0, start: float = 3.0) -> tuple[Any, Any]:
         knots += [one["start_s"] - 0.5, one["end_s"] + 0.5]
         values += [[one["alpha_deg"], one["beta_deg"]]] * 2
     columns = np.array(values, float).T
-    return t, np.array([_axes(*pair) for pair in _angles(t + off, knots, columns)])
+    return t, _axes(*_angles(t + off, knots, columns))
 
 
 def motion(start: float = 3.0, gravity: float = GRAVITY) -> tuple[Any, Any, Any]:

@@ -31,6 +31,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fieldcal.core.rotation import cross
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import NO_SHAPE, Param, Sensor
 from fieldcal.physics.experience import Experience
@@ -73,12 +74,13 @@ class JointCreep(Sensor):
         followed = np.isfinite(x.alpha_axis).all(axis=1)
         axes[followed, :, 0] = x.alpha_axis[followed]
         angle, rate = self._course(x, shape["tau_s"])
-        out[:, :3] = np.cross(x.f[:, :, None], axes, axis=1) * angle[:, None]
-        out[:, 3:] = axes * rate[:, None]
         # in a turn beta carries the device as it has crept; alpha carries beta's axis
-        carried = np.column_stack([x.position >= 0, np.ones(len(x), bool)])
-        turned = np.cross(x.w[:, :, None], axes, axis=1)
-        out[:, 3:] += turned * (angle * carried)[:, None]
+        carried = angle * np.column_stack([x.position >= 0, np.ones(len(x), bool)])
+        for j in (0, 1):
+            axis = axes[:, :, j]
+            out[:, :3, j] = cross(x.f, axis) * angle[:, j, None]
+            out[:, 3:, j] = axis * rate[:, j, None]
+            out[:, 3:, j] += cross(x.w, axis) * carried[:, j, None]
         out *= np.deg2rad(1.0)
         return out
 
@@ -87,13 +89,16 @@ class JointCreep(Sensor):
         """Sum of all turns so far, (n, 2), and its rate of change, 1/s."""
         turns = x.joint_turns
         since = np.subtract.outer(x.t, turns.at)
-        u = np.clip(1 + since / ONSET_S, 0.0, 1.0)
-        going = u - np.sin(2 * np.pi * u) / (2 * np.pi)
-        speed = (1 - np.cos(2 * np.pi * u)) / ONSET_S
-        half = x.lasts[:, None] / (2 * tau)  # a row is a mean over some time
+        over, on_way = since >= 0, (since > -ONSET_S) & (since < 0)
+        h, speed = np.zeros_like(since), np.zeros_like(since)
+        phase = 2 * np.pi * (1 + since[on_way] / ONSET_S)
+        h[on_way] = (phase - np.sin(phase)) / (2 * np.pi)
+        speed[on_way] = (1 - np.cos(phase)) / ONSET_S
+        half = x.lasts / (2 * tau)  # a row is a mean over some time
         mean = np.where(half > 0, np.sinh(half) / np.maximum(half, 1e-300), 1.0)
-        back = mean * np.exp(-np.maximum(since, 0.0) / tau)
-        over = since >= 0
-        angle: Array = np.where(over, back, going) @ turns.side
-        rate: Array = np.where(over, -back / tau, speed) @ turns.side
+        row = np.nonzero(over)[0]
+        h[over] = mean[row] * np.exp(-since[over] / tau)
+        speed[over] = -h[over] / tau
+        angle: Array = h @ turns.side
+        rate: Array = speed @ turns.side
         return angle, rate

@@ -21,7 +21,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from fieldcal.core.samples import Array
@@ -103,6 +102,7 @@ def cusum_limit(units: float, slack: float = SLACK) -> float:
     >>> round(cusum_limit(465, 0.5), 1)
     5.0
     """
+    from scipy.optimize import brentq
 
     def over(h: float) -> float:
         b = 2 * slack * (h + 1.166)
@@ -118,6 +118,7 @@ def ewma_limit(units: float, weight: float) -> float:
     >>> round(ewma_limit(500.0, 0.2), 2), round(ewma_limit(500.0, 0.1), 2)
     (2.96, 2.82)
     """
+    from scipy.optimize import brentq
 
     def over(bound: float) -> float:
         return float(np.log(_average_run_length(bound, weight) / units))

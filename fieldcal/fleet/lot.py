@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import TILTS, group_of
@@ -232,8 +232,8 @@ def yield_interval(good: int, count: int) -> tuple[float, float, float]:
     [0.9, 0.619, 0.989]
     """
     a, b = good + 0.5, count - good + 0.5
-    low = 0.0 if not good else float(beta.ppf(0.025, a, b))
-    high = 1.0 if good == count else float(beta.ppf(0.975, a, b))
+    low = 0.0 if not good else float(betaincinv(a, b, 0.025))
+    high = 1.0 if good == count else float(betaincinv(a, b, 0.975))
     return good / count, low, high
 
 

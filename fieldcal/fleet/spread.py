@@ -28,7 +28,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import expit, stdtr
 
 from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array
@@ -86,7 +86,7 @@ class UnitDistribution:
     def tail_probabilities(self, x: Array) -> Array:
         """Probability of a deviation of this size or more, (n,), by Student's t."""
         dof = max(float(self.typical_probability.sum()) - 1.0, 1.0)
-        out: Array = 2 * student.sf(np.abs(x - self.mean) / self.sigma, dof)
+        out: Array = 2 * stdtr(dof, -np.abs(x - self.mean) / self.sigma)
         return out
 
 
@@ -101,7 +101,7 @@ def estimate_distribution(x: Array, sigma: Array) -> UnitDistribution:
         square = (x - middle[:, None]) ** 2 / variance
         core = np.log1p(-share)[:, None] - 0.5 * square
         odd = np.log(share / WIDER)[:, None] + CAUCHY - np.log1p(square / WIDER**2)
-        typical = np.exp(core - np.logaddexp(core, odd))
+        typical = expit(core - odd)
         weight = typical + (1 - typical) * 2 / (WIDER**2 + square)
         weight /= variance
         middle = (weight * x).sum(axis=1) / weight.sum(axis=1)

@@ -73,12 +73,20 @@ class State:
 
     def experienced(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
         """Inputs of rows with small rotations, the Earth's rate and motion effects."""
+        return self.moved(self.turned(x), more)
+
+    def turned(self, x: Experience) -> Experience:
+        """Inputs of rows with small rotations and the Earth's rate alone."""
         if self.small_rotation.any():
             x = rotate_positions(x, self.small_rotation)
         if self.attitude.any():
             x = tilt_positions(x, self.attitude)
         if self.earth.any():
             x = x.turned(base_rate=x.base_rate + self.earth)
+        return x
+
+    def moved(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
+        """Inputs of rows `x` from `turned` with motion effects."""
         terms = (*self.terms, *more) if more else self.terms
         for term in sorted(terms, key=lambda t: t.order):
             if isinstance(term.effect, Motion):

@@ -62,7 +62,8 @@ class LinkMarks:
         self._driver, self._recorder = driver, recorder
         self._before = self._counts()
         self._last = self._from = self._to = float("nan")
-        self._longest, self._usual = 0.0, float("nan")
+        self._longest = 0.0
+        self._steps: Array = np.zeros(0)
         self._marked = -MARK_EVERY_S
         self._clocked = monotonic()
         self._grain = Grain()
@@ -98,12 +99,13 @@ class LinkMarks:
 
     def _has_long_gap(self, steps: Array) -> bool:
         """Whether time passed that is long, also for a slow device."""
-        known = steps[np.isfinite(steps)]
-        usual = self._usual
+        known, before = steps[np.isfinite(steps)], self._steps
         if len(known) > 1:
-            self._usual = float(np.median(known))
+            self._steps = known
         longest = float(known.max(initial=0.0))
-        return longest >= LONG_GAP_S and longest > GAP_INTERVALS * usual
+        if longest < LONG_GAP_S or not len(before):
+            return False
+        return longest > GAP_INTERVALS * float(np.median(before))
 
     def end(self) -> None:
         """Mark everything that has not been marked yet."""

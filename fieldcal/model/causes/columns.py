@@ -122,11 +122,13 @@ def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> Gen
         return design
 
     def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
+        turned = state.turned(plain)
         for j, param in enumerate(effect.params):
             step = np.zeros(len(effect.params))
             step[j] = DERIVATIVE_STEP * param.typical
             up, down = (
-                _with_changed_parameters(plain, state, effect, s) for s in (step, -step)
+                _with_changed_parameters(turned, state, effect, s)
+                for s in (step, -step)
             )
             yield up, down, float(step[j])
 
@@ -208,13 +210,16 @@ def _difference(up: Experience, down: Experience, step: float, state: State) -> 
 
 
 def _with_changed_parameters(
-    plain: Experience, state: State, effect: Effect, more: Array
+    turned: Experience, state: State, effect: Effect, more: Array
 ) -> Experience:
-    """Inputs with the parameters of a motion effect changed by `more`."""
+    """Inputs with the parameters of a motion effect changed by `more`.
+
+    `turned` are those without motion effects.
+    """
     present = [t.values for t in state.terms if t.effect is effect]
     rest = tuple(t for t in state.terms if t.effect is not effect)
     term = Term(effect, sum(present, np.zeros(len(more))) + more)
-    return replace(state, terms=(*rest, term)).experienced(plain)
+    return replace(state, terms=(*rest, term)).moved(turned)
 
 
 def bias(view: RowView) -> Array:

@@ -29,6 +29,7 @@ Source: Karhunen-Loeve series of Brownian motion; IEEE Std 952 for flicker noise
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -123,23 +124,29 @@ class Wander:
         out: Array = (walks + a**2 * _residual_of_flicker(self.length, few, count))[at]
         return out
 
-    def residual_covariance(self, t: Array, length: Array) -> Array:
-        """Covariance of means about some instants beyond the cosines, (6, n, n)."""
+    def residual_covariance(
+        self, t: Array, length: Array, channels: Sequence[int] = range(6)
+    ) -> Array:
+        """Covariance of means about some instants beyond the cosines, (c, n, n).
+
+        Of each of c channels; the means are over `length` (n,) s about `t` (n,) s.
+        """
         y = np.pi * np.abs(np.subtract.outer(t, t)) / max(self.length, 1e-9)
-        out, diagonal = np.zeros((6, *y.shape)), np.s_[:: len(t) + 1]
-        for c in range(6):
+        k = np.arange(1, self.modes[[*channels]].max() + 1)
+        waves = np.cos(np.multiply.outer(y, k))
+        out, diagonal = np.zeros((len(channels), *y.shape)), np.s_[:: len(t) + 1]
+        for own, c in zip(out, channels, strict=True):
             q, a, count = self._of_channel(c)
             variance = self.residual_variance(length, c)
             if not variance.any():
                 continue
-            k = np.arange(1, count + 1)
-            waves = np.cos(np.multiply.outer(y, k))
-            left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - waves @ (1 / k**2)
-            out[c] = q**2 * self.length / np.pi**2 * left  # (3)
+            fitted, k = waves[..., :count], np.arange(1, count + 1)
+            left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - fitted @ (1 / k**2)
+            own[:] = q**2 * self.length / np.pi**2 * left  # (3)
             if a:
                 all_cosines = -np.log(2 * np.sin(np.clip(y, MIN_PHASE, np.pi) / 2))
-                out[c] += a**2 / 2 * (all_cosines - waves @ (1 / k))  # (4)
-            out[c].flat[diagonal] = variance
+                own += a**2 / 2 * (all_cosines - fitted @ (1 / k))  # (4)
+            own.flat[diagonal] = variance
         return out
 
     def _of_channel(self, channel: int) -> tuple[float, float, int]:

@@ -167,7 +167,8 @@ def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, 
     out.closure_errors[i, :count] = turn.closure_errors
     if not len(turn.way):
         return 0.0, 0
-    design = turn.way_design[:, selected]
+    on_way = selected & turn.way_design.any(axis=0)  # few: what no window shows
+    at, design = all_[on_way], turn.way_design[:, on_way]
     out.within[np.ix_(at, at)] += design.T @ design
     out.rhs[at] += design.T @ turn.way
     return float(turn.way @ turn.way), len(turn.way)

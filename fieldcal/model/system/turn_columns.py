@@ -2,12 +2,12 @@
 
 The closure depends on the outputs of the gyroscopes by the integral (1) of `turn`, and
 on the inputs in the positions at both ends. Columns are calculated for all turns at
-once, except those that need a whole turn.
+once, except those that need a whole turn, or that change its ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -52,6 +52,7 @@ class _TurnColumnsBuilder:
 
     def __post_init__(self) -> None:
         self.weights = self.turn.weights(self.view.state.scale[3:])
+        self.flat_weights = self.weights.reshape(3, -1)  # (3, 3 (m + 1))
 
     def no_closing(self, index: Index) -> None:
         """Add columns (k,) that do not change the closure through the gyroscopes."""
@@ -66,11 +67,13 @@ class _TurnColumnsBuilder:
             self.index.append(first + (3 + c) * width + np.arange(width))
             self.closing.append(weight @ table)
 
-    def general_form(self, index: Index, table: Array, bent: Array) -> None:
+    def general_form(
+        self, index: Index, table: Array, bent: Array | float = 0.0
+    ) -> None:
         """Add columns (m + 1, 6, k), with their change of the ends, (3, k)."""
-        turned = np.tensordot(self.weights, table[:, 3:], 2)
+        rates = table[:, 3:].reshape(self.flat_weights.shape[1], -1)
         self.index.append(index)
-        self.closing.append(turned - bent)
+        self.closing.append(self.flat_weights @ rates - bent)
 
     def met(self) -> TurnColumns:
         """The collected columns."""
@@ -116,38 +119,33 @@ def columns_of_turns(
                         even = np.ones((len(builder.view.x), 1))
                         builder.course(first, even, builder.turn.standing_share)
             continue
-        for builder, (columns, table, bent) in zip(
-            builders,
-            _general_columns(first, basis, builders, every, cut, at_ends),
-            strict=True,
-        ):
-            builder.general_form(columns, table, bent)
-            if known is not None:
-                kept = turn_force_columns(columns, dictionary, known)
-                builder.general.append((columns[kept], table[:, :, kept]))
+        if first in at_ends:
+            for builder in builders:
+                columns, outputs, bent = at_ends[first].columns_for(
+                    builder.turn, builder.view.state.scale
+                )
+                builder.general_form(columns, outputs, bent)
+                if known is not None:
+                    kept = turn_force_columns(columns, dictionary, known)
+                    builder.general.append((columns[kept], outputs[:, :, kept]))
+            continue
+        table = _outputs(basis, views, every)
+        columns = first + np.arange(table.shape[2])
+        for builder, part in zip(builders, np.split(table, cut), strict=True):
+            builder.general_form(columns, part)
+        if known is not None:
+            kept = turn_force_columns(columns, dictionary, known)
+            parts = np.split(table[:, :, kept], cut)
+            for builder, part in zip(builders, parts, strict=True):
+                builder.general.append((columns[kept], part))
     return [builder.met() for builder in builders]
 
 
-def _general_columns(
-    first: int,
-    basis: General,
-    builders: Sequence[_TurnColumnsBuilder],
-    every: RowView,
-    cut: Index,
-    at_ends: Mapping[int, EndColumns],
-) -> Iterator[tuple[Index, Array, Array]]:
-    """Columns (k,) of each turn, outputs (m + 1, 6, k), and change of ends (3, k)."""
-    if first in at_ends:
-        for builder in builders:
-            yield at_ends[first].columns_for(builder.turn, builder.view.state.scale)
-        return
+def _outputs(basis: General, views: Sequence[RowView], every: RowView) -> Array:
+    """Outputs of a basis at the edges of all turns, (n, 6, k)."""
     if basis.needs_whole_turn:
-        parts = [basis.evaluate(builder.view) for builder in builders]
-    else:
-        parts = np.split(basis.evaluate(every), cut)
-    for table in parts:
-        width = table.shape[2]
-        yield first + np.arange(width), table, np.zeros((3, width))
+        return np.concatenate([basis.evaluate(view) for view in views])
+    return basis.evaluate(every)
 
 
 def _concatenate(views: Sequence[RowView]) -> RowView:

@@ -146,7 +146,7 @@ class TurnForceRows:
         apart = np.subtract.outer(middle, middle) / priors.BUILD_UP_S
         course = 1.0 + np.exp(-(apart**2) / 2)
         walks = self.dictionary.wander.residual_covariance(
-            middle, np.diff(x.t[turn.cut])
+            middle, np.diff(x.t[turn.cut]), range(3)
         )
         for c in range(3):
             cov[c::3, c::3] += walks[c]

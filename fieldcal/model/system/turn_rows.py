@@ -173,8 +173,10 @@ class Turns:
             close = close - bent @ self.means[p][:, index]
             ends = ends + bent @ self._force_covariance(p) @ bent.T
         touching = np.abs(close).max(axis=0) > 0
-        for columns, outputs in general:
-            touching[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
+        if general:
+            moved = [columns[np.any(outputs != 0.0, axis=(0, 1))]
+                     for columns, outputs in general]  # fmt: skip
+            touching |= np.isin(index, np.concatenate(moved))
         index = index[touching]
         basis, info = _known_axes(across, ends, self._closure_variance(turn, view))
         close = basis @ close[:, touching]

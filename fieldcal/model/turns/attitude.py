@@ -45,8 +45,8 @@ def interpolate_vectors(
     3, 3) is R, and `done` (m + 1,) the completed part of the turn.
     """
     part = done.reshape(-1, *[1] * start.ndim)
-    from_end = attitude @ attitude[-1].T
-    out: Array = (1 - part) * (attitude @ start) + part * (from_end @ end)
+    at_start = attitude[-1].T @ end
+    out: Array = (1 - part) * (attitude @ start) + part * (attitude @ at_start)
     return out
 
 

@@ -37,9 +37,9 @@ def sunk(seed: int, by: float, count: int = len(ANGLES)) -> Block:
     rng, parts = np.random.default_rng(seed), []
     for (alpha, beta), place in zip(ANGLES[:count], PLACES, strict=False):
         t = np.arange(place["start_s"] - 0.5, place["end_s"] + 0.5, 1 / RATE)
-        tilt = by * (1 - np.exp(-t / 150.0))[:, None] * [0.8, -0.6]
+        tilt = by * (1 - np.exp(-t / 150.0)) * np.array([[0.8], [-0.6]])
         a, b = np.deg2rad([alpha, beta]).tolist()
-        f = np.array([force(a, b, base=(x, z), g=G) for x, z in tilt.tolist()])
+        f = force(a, b, base=tilt, g=G)
         acc = ACC + f + 2e-3 * rng.standard_normal(f.shape)
         parts.append(np.column_stack(
             [t, acc, GYR + 2e-4 * rng.standard_normal(f.shape)]

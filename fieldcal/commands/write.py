@@ -90,10 +90,10 @@ def propose_changes(
 
     """
     from fieldcal.calibration import Nominal
+    from fieldcal.drivers.mavlink_installed import GYRO_CAL_AT_START, replaced_at_start
     from fieldcal.install.proposal import (
         changes,
         installed_in,
-        replaced_at_start,
         unsupported_parameters,
     )
 
@@ -104,7 +104,11 @@ def propose_changes(
             " record it over mavlink:, or write a file by fieldcal export"
         )
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
-    says = (*unsupported_parameters(found), *replaced_at_start(installed))
+    averages = installed.values.get(GYRO_CAL_AT_START, 0.0)
+    says = (
+        *unsupported_parameters(found),
+        *replaced_at_start(installed.instance, averages),
+    )
     return changes(found, nominal, installed), installed, says
 
 

@@ -66,6 +66,35 @@ def test_an_autopilot_corrects_raw_samples_as_apply_does(
         assert not found.notices
 
 
+def test_what_ardupilot_would_not_take_for_a_calibration_is_said() -> None:
+    """Outside of its list's range; and 0, 0, 0, with which it does not arm."""
+    cal = calibration(np.random.default_rng(1), 0.0)
+    wide = replace(cal, values=np.where([n == "acc_bias.y" for n in cal.names], 4.0,
+                                        cal.values))  # fmt: skip
+    (said,) = ardupilot.parameters(wide).notices
+    assert said.startswith("INS_ACCOFFS_Y = 4 is outside of the range")
+    scales = without(cal, *(f"acc_bias.{axis}" for axis in "xyz"))
+    assert any("does not arm" in s for s in ardupilot.parameters(scales).notices)
+    assert not any("not arm" in s for s in px4.parameters(scales).notices)
+
+
+def test_px4_has_four_sensors_and_ardupilot_five() -> None:
+    cal = calibration(np.random.default_rng(1), 0.0)
+    assert px4.parameters(cal, instance=3) and ardupilot.parameters(cal, instance=4)
+    with pytest.raises(InputError, match="no sensor 4: its last one is 3"):
+        px4.parameters(cal, instance=4)
+
+
+def test_what_the_programs_do_with_a_file_is_said(
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
+) -> None:
+    """ArduPilot averages its gyroscopes at each start; PX4 goes by the sensors' ids."""
+    says = load_exporter("ardupilot").write(made[0], tmp_path / "a.param")
+    assert any("unless INS_GYR_CAL = 0" in s and "INS_GYROFFS_X" in s for s in says)
+    says = load_exporter("px4").write(made[0], tmp_path / "p.params")
+    assert any("CAL_ACC0_ID and CAL_GYRO0_ID" in s for s in says)
+
+
 def test_ardupilot_numbers_its_fourth_imu_before_the_sensor() -> None:
     """INS4_ACCOFFS_X, as its list of parameters has it, beside INS_ACC3OFFS_X."""
     cal = calibration(np.random.default_rng(1), 0.0)

@@ -118,12 +118,12 @@ def _check_installable(
     installed: InstalledCalibration,
     force: bool,
 ) -> None:
+    from fieldcal.commands.decision_view import reasons_against
     from fieldcal.install.proposal import problems
 
-    decision = found.info.get("decision")
-    reasons = list(decision["reasons"]) if decision else ["nobody decided about it"]
-    if decision and decision["go"] and found.good:
-        reasons = []
+    reasons = reasons_against(found)
+    if not found.info.get("decision"):
+        reasons = ["nobody decided about it"]
     reasons += problems(tuple(wanted), installed)
     if reasons and not force:
         raise InstallRefused(

@@ -410,6 +410,36 @@ def test_what_was_not_determined_is_said_not_filled_in_silence(
     assert "GYR" not in (tmp_path / "a.param").read_text().partition("INS_")[2]
 
 
+@pytest.mark.parametrize(
+    ("good", "decision", "expected"),
+    [
+        (True, {"go": True, "reasons": []}, None),
+        (True, None, None),
+        (True, {"go": False, "reasons": ["it was too warm"]}, "NO-GO: it was too warm"),
+        (False, None, "NO-GO: the calibration is bad: two axes are swapped"),
+        (False, {"go": True, "reasons": []}, "NO-GO: the calibration is bad: two axes"),
+    ],
+)
+def test_what_is_not_to_be_used_is_not_handed_on_in_silence(
+    good: bool,
+    decision: dict[str, Any] | None,
+    expected: str | None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rng = np.random.default_rng(9)
+    info = {"decision": decision} if decision else {}
+    warnings = () if good else ("two axes are swapped",)
+    cal = replace(calibration(rng, 0.0), good=good, info=info, warnings=warnings)
+    source(tmp_path / "s", cal, samples(rng))
+    place, out = str(tmp_path / "s"), str(tmp_path / "out.csv")
+    for call in (["export", place, "--format", "csv", "-o", f"{out}.csv"],
+                 ["apply", place, out]):  # fmt: skip
+        assert main(call) == 0
+        said = capsys.readouterr().err
+        assert expected in said if expected else "NO-GO" not in said
+
+
 def test_apply_says_of_which_axes_the_nominal_values_are_taken(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

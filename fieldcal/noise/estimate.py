@@ -83,7 +83,8 @@ class ChannelEstimate:
     pair : white noise and random walk for filters that have only these
     averaging : error of a mean against its length
     dispersion : as in `ChosenProcesses`
-    filtered_hz : above this frequency the outputs are filtered; inf where they are not
+    filtered_hz : lowest frequency of what is left out because the outputs are filtered,
+        or hum; inf where nothing is
 
     """
 

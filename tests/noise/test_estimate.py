@@ -235,6 +235,25 @@ def test_the_bend_of_a_filter_below_its_corner_is_not_taken_for_less_noise(
     assert np.mean(pulls) > -1 and np.sqrt(np.mean(np.square(pulls))) < 1.6
 
 
+@pytest.mark.statistical
+@pytest.mark.parametrize(("name", "size"), [("K", 0.02), ("B", 0.05), ("Q", 0.02)])
+def test_every_process_is_found_or_has_a_limit_that_holds(
+    name: str, size: float
+) -> None:
+    """Of 18 channels with a process that is hardly seen, two limits may be too low."""
+    holds = []
+    for seed in range(3):
+        values = noise(np.random.default_rng(seed), 3000, DT, 6, N=1.0, **{name: size})
+        made = estimate_noise([reduce_recording([recording(values, DT)])])
+        for channel in made.channels.values():
+            assert {*channel.processes, *channel.limits} >= {"N", "B", "K", "Q"}
+            if name in channel.limits:
+                limit = channel.limits[name].value
+                assert limit < 20 * size
+                holds.append(limit > size)
+    assert len(holds) > 9 and sum(holds) >= len(holds) - 2
+
+
 def test_two_processes_of_the_same_time_are_one() -> None:
     levels = CosineLevels(DT, 1, 1)
     levels.add(noise(np.random.default_rng(40), 3000, DT, 1, N=1.0, s=1.0, T=2.0))

@@ -66,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.report:
         check_writable(args.report)
+    _check_distinct(args.sessions)
     with TemporaryDirectory(prefix="fieldcal-noise-") as place:
         sessions = [
             _open_session(path, Path(place) / str(i))
@@ -95,6 +96,23 @@ def run(args: argparse.Namespace) -> int:
         written = write_atomically(args.report, render_noise_page(found))
         (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")
     return 0
+
+
+def _check_distinct(paths: Sequence[Path]) -> None:
+    """Refuse a recording that is there twice: its noise would count as more.
+
+    Raises
+    ------
+    InputError
+        Naming it.
+
+    """
+    from fieldcal.core.errors import InputError
+
+    places = [path.resolve() for path in paths]
+    for i, place in enumerate(places):
+        if place in places[:i]:
+            raise InputError(f"{paths[i]}: is there twice: give each session once")
 
 
 def _open_session(path: Path, place: Path) -> Session:

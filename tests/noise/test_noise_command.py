@@ -171,6 +171,12 @@ def test_the_history_tells_when_to_recalibrate(
     assert told["channels"]["ax"]["after_s"][1] < 86400
 
 
+def test_a_session_counts_once(told: Told, capsys: pytest.CaptureFixture[str]) -> None:
+    again = told.folder.parent / "." / told.folder.name / ".." / told.folder.name
+    assert main(["noise", str(told.folder), str(again)]) == 2
+    assert "is there twice: give each session once" in capsys.readouterr().err
+
+
 def test_sessions_of_two_devices_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

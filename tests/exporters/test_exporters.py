@@ -27,6 +27,7 @@ from fieldcal.drivers.mavlink_installed import (
     parameter_names,
 )
 from fieldcal.exporters import ExportSource, ardupilot, format_names, load_exporter, px4
+from fieldcal.exporters.kalibr import window_noise_density
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.session.sample_files import find_samples
@@ -309,6 +310,22 @@ def test_kalibr_predicts_what_was_recorded(
     assert told["accelerometer_noise_density"] == pytest.approx(0.9, rel=0.5)
     assert told["gyroscope_noise_density"] == pytest.approx(0.1, rel=0.5)
     assert "accelerometer_random_walk" not in told
+
+
+@pytest.mark.statistical
+def test_a_density_of_windows_has_the_error_that_is_told(tmp_path: Path) -> None:
+    """Scatter of 90 windows of white noise, 12 s each, in stated errors."""
+    rng, pulls = np.random.default_rng(5), []
+    for number in range(15):
+        folder, n = tmp_path / str(number), 1200
+        values = rng.normal(0, 0.3, (n, 6))
+        tables = {"format": 1, "device": {"name": "t"}, "position": [{}]}
+        with Recorder(folder, tables) as recorder:
+            recorder.append(Block.of(np.arange(n) / 100, values[:, :3], values[:, 3:]))
+            recorder.mark("window", position=0, start_s=0.0, end_s=12.0)
+        density, error = window_noise_density(Session.open(folder))
+        pulls += ((density - 0.03) / error).tolist()
+    assert abs(np.mean(pulls)) < 0.5 and 0.7 < np.std(pulls) < 1.3
 
 
 def test_imu_calib_corrects_by_sm_u_minus_bias(

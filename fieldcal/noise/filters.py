@@ -13,9 +13,10 @@ a filter with the step h, where noise is held for a step,
     white  N / sqrt(h),    bias  K / sqrt(h)   per second                          (2)
 
 h: EKF3 of ArduPilot 12 ms, EKF2 of PX4 10 ms. A covariance of single samples, as
-sensor_msgs/Imu has it, is N^2 times the rate. Sources: Kalibr wiki, IMU noise model;
-covariance prediction of EKF3 and EKF2, where a step adds (h w)^2 to an angle and
-(h h p)^2 to a bias times h.
+sensor_msgs/Imu has it, is N^2 times the rate: what a filter that takes them for
+independent needs. Samples of a device with a low-pass scatter by less. Sources: Kalibr
+wiki, IMU noise model; covariance prediction of EKF3 and EKF2, where a step adds
+(h w)^2 to an angle and (h h p)^2 to a bias times h.
 """
 
 from __future__ import annotations

@@ -34,6 +34,9 @@ FILTERED_HZ = 1.0
 BENT = 2.5
 """Standard errors by which an octave is off that a filter bends."""
 
+MIN_LEFT = 500
+"""Fewest coefficients that are left: they tell white noise to 3 %."""
+
 FOLDED = 0.02
 """Largest part of its white noise that a bin may have from beyond a corner."""
 
@@ -256,12 +259,14 @@ def _without_bend(spectrum: CosineSpectrum, powers: Powers) -> Powers:
     In each bin that is too little to be seen, and in all of them it is several standard
     errors of the white noise. It is the bend of the next octave, and in means over
     several samples the part of white noise that is folded from beyond the corner, where
-    a filtered device has none.
+    a filtered device has none. Where too little would be left, white noise is not known
+    well enough for it to matter.
     """
     free = powers.free | _octave(spectrum, powers)
     corner = float(spectrum.frequency[~free].max())
     lacking = (spectrum.folded_share > FOLDED) & (spectrum.folded_from > corner)
-    return replace(powers, free=free | lacking)
+    left = replace(powers, free=free | lacking)
+    return left if left.count[~left.free].sum() >= MIN_LEFT else powers
 
 
 def _octave(spectrum: CosineSpectrum, powers: Powers) -> Flags:

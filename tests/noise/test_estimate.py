@@ -235,6 +235,15 @@ def test_the_bend_of_a_filter_below_its_corner_is_not_taken_for_less_noise(
     assert np.mean(pulls) > -1 and np.sqrt(np.mean(np.square(pulls))) < 1.6
 
 
+def test_a_minute_that_looks_filtered_by_chance_still_tells_its_white_noise() -> None:
+    """The one of 150 recordings of 600 samples whose bins above 1 Hz look odd."""
+    values = noise(np.random.default_rng(10), 600, DT, 6, N=1.0)
+    made = estimate_noise([reduce_recording([recording(values, DT)])])
+    white = made.channels["gy"].processes["N"]
+    assert made.channels["gy"].filtered_hz < 5
+    assert abs(white.value - 1) < 0.15
+
+
 @pytest.mark.statistical
 @pytest.mark.parametrize(("name", "size"), [("K", 0.02), ("B", 0.05), ("Q", 0.02)])
 def test_every_process_is_found_or_has_a_limit_that_holds(

@@ -35,8 +35,10 @@ GYRO_CAL_AT_START = "INS_GYR_CAL"
 """Parameter of ArduPilot: whether it averages its gyroscopes at each start."""
 
 
-MOST_SENSORS = 5
-"""Largest number of IMUs of an autopilot."""
+SENSORS = {ARDUPILOT: 5, PX4: 4}
+"""Number of IMUs that each program has parameters for."""
+
+MOST_SENSORS = max(SENSORS.values())
 
 NUMBERED_SENSORS = 3
 """ArduPilot's sensors whose number follows the sensor's name, as in INS_ACC2OFFS; that
@@ -84,6 +86,43 @@ def parameter_names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]
             "rotation": ("SENS_BOARD_ROT",),
         }
     return {}
+
+
+def check_number(autopilot: int, instance: int) -> None:
+    """Refuse the number of an IMU that a program has no parameters for.
+
+    Raises
+    ------
+    InputError
+        With the largest number.
+
+    """
+    if instance >= SENSORS.get(autopilot, MOST_SENSORS):
+        raise InputError(
+            f"the autopilot has no sensor {instance}: its last one is"
+            f" {SENSORS[autopilot] - 1}"
+        )
+
+
+def replaced_at_start(instance: int, averages: float | None = None) -> tuple[str, ...]:
+    """What ArduPilot replaces when it starts, a sentence if it does.
+
+    Parameters
+    ----------
+    instance : number of the IMU, from 0
+    averages : its `GYRO_CAL_AT_START`; None if unknown
+
+    """
+    if averages == 0:
+        return ()
+    known = "" if averages is None else f"{GYRO_CAL_AT_START} = {averages:g}: "
+    unless = f"unless {GYRO_CAL_AT_START} = 0, " if averages is None else ""
+    first = f"{ardupilot_prefix('GYR', instance)}OFFS_X"
+    return (
+        f"{known}{unless}the autopilot averages its gyroscopes at each start and"
+        f" replaces {first}, Y, Z, whatever is written; set {GYRO_CAL_AT_START} = 0 to"
+        " keep them",
+    )
 
 
 def other_processing_parameters(autopilot: int, instance: int) -> tuple[str, ...]:

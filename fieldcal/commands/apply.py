@@ -36,6 +36,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.calibration import Nominal
     from fieldcal.commands.compare import read_calibration
+    from fieldcal.commands.decision_view import reasons_against
     from fieldcal.commands.install_values import check_same_installed
     from fieldcal.session.folder import Session
 
@@ -52,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
             "fieldcal apply: not determined, the nominal value is taken:"
             f" {', '.join(kept)}\n"
         )
+    if reasons := reasons_against(calibration):
+        sys.stderr.write(f"fieldcal apply: NO-GO: {'; '.join(reasons)}\n")
     _write_samples(args.out, block)
     sys.stdout.write(f"written: {args.out}, {len(block)} samples, m/s^2 and rad/s\n")
     return 0

@@ -44,6 +44,16 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
         _print_resume_command(folder, remedy)
 
 
+def reasons_against(found: Calibration) -> list[str]:
+    """Why a calibration is not to be used: NO-GO, or bad without a decision."""
+    decision = found.info.get("decision") or {"go": True}
+    if not decision["go"]:
+        return list(decision.get("reasons", ())) or ["it was decided so"]
+    if not found.good:
+        return [f"the calibration is bad: {', '.join(found.warnings[:1]) or 'its fit'}"]
+    return []
+
+
 def _print_resume_command(folder: Path, remedy: dict[str, Any] | None) -> None:
     """Print the command that takes the remedy or the positions that were left out."""
     from fieldcal.commands.console import EscapingConsole

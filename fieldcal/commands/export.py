@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.calibration import Nominal
     from fieldcal.commands.compare import read_calibration
+    from fieldcal.commands.decision_view import reasons_against
     from fieldcal.core.errors import InputError
     from fieldcal.exporters import ExportSource, load_exporter
     from fieldcal.install.proposal import installed_in
@@ -66,8 +67,9 @@ def run(args: argparse.Namespace) -> int:
     if path.exists():
         raise InputError(f"{path}: is there already; name another file with -o")
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
+    calibration = read_calibration(args.calibration or args.session)
     source = ExportSource(
-        read_calibration(args.calibration or args.session),
+        calibration,
         nominal,
         session,
         installed_in(session),
@@ -77,5 +79,7 @@ def run(args: argparse.Namespace) -> int:
     # what was cut off or left out of the samples, where the format holds them
     for sentence in (*session.warnings[known:], *said):
         sys.stderr.write(f"fieldcal export: {sentence}\n")
+    if reasons := reasons_against(calibration):
+        sys.stderr.write(f"fieldcal export: NO-GO: {'; '.join(reasons)}\n")
     sys.stdout.write(f"{path}\n")
     return 0

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from fieldcal.history.location import StoreLocation
     from fieldcal.noise import NoiseModel
     from fieldcal.noise.document import NoiseResult
-    from fieldcal.noise.recalibration import HistoryStep, Recalibration
+    from fieldcal.noise.history_walk import EarlierBias
+    from fieldcal.noise.recalibration import Recalibration
     from fieldcal.session.clock_steps import ClockStepRemover
     from fieldcal.session.folder import Session
 
@@ -65,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.report:
         check_writable(args.report)
+    _check_distinct(args.sessions)
     with TemporaryDirectory(prefix="fieldcal-noise-") as place:
         sessions = [
             _open_session(path, Path(place) / str(i))
@@ -94,6 +96,23 @@ def run(args: argparse.Namespace) -> int:
         written = write_atomically(args.report, render_noise_page(found))
         (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")
     return 0
+
+
+def _check_distinct(paths: Sequence[Path]) -> None:
+    """Refuse a recording that is there twice: its noise would count as more.
+
+    Raises
+    ------
+    InputError
+        Naming it.
+
+    """
+    from fieldcal.core.errors import InputError
+
+    places = [path.resolve() for path in paths]
+    for i, place in enumerate(places):
+        if place in places[:i]:
+            raise InputError(f"{paths[i]}: is there twice: give each session once")
 
 
 def _open_session(path: Path, place: Path) -> Session:
@@ -237,36 +256,28 @@ def _recalibration_times(
     out = {}
     for name, channel in model.channels.items():
         group = "acc_bias" if name[0] == "a" else "gyr_bias"
-        steps = _history_steps(runs, f"{group}.{name[1]}")
+        earlier = _earlier_biases(runs, f"{group}.{name[1]}")
         limit = float(getattr(allowed, f"{group}_sigma"))
         variance = channel.averaging.at(AVERAGED_S)[0] ** 2
         pair = channel.pair
         unseen = pair.walk / pair.left_out if math.isnan(pair.walk_sigma) else 0.0
         out[name] = recalibration_time(
-            channel.drawn, channel.ramp, limit, variance, steps, unseen
+            channel.drawn, channel.ramp, limit, variance, earlier, unseen
         )
     dates = [str(run.taken_at) for run in runs if run.taken_at]
     return out, dates[-1] if dates else datetime.now(UTC).isoformat()
 
 
-def _history_steps(runs: Sequence[Any], name: str) -> list[HistoryStep]:
-    """Changes of a bias between calibrations that count as its family."""
+def _earlier_biases(runs: Sequence[Any], name: str) -> list[EarlierBias]:
+    """A bias by the calibrations that count as its family, one for each time."""
     from fieldcal.history.store import family_runs, recording_time
-    from fieldcal.noise.recalibration import HistoryStep
+    from fieldcal.noise.history_walk import EarlierBias
 
-    values = []
+    found: dict[float, EarlierBias] = {}
     for one in family_runs(runs):
-        found = one.calibration
+        known = one.calibration
         when = recording_time(one.taken_at)
-        if name in found.names and when is not None:
-            i = found.names.index(name)
-            values.append(
-                (when.timestamp(), float(found.values[i]), float(found.sigma[i]))
-            )
-    return [
-        HistoryStep(then - when, after - before, one**2 + two**2)
-        for (when, before, one), (then, after, two) in zip(
-            values, values[1:], strict=False
-        )
-        if then > when
-    ]
+        if name in known.names and when is not None:
+            at = when.timestamp()
+            found[at] = EarlierBias(at, known.value(name), known.uncertainty(name) ** 2)
+    return [found[at] for at in sorted(found)]

@@ -105,7 +105,10 @@ def _other_processes(channel: ChannelEstimate, scale: float, unit: str) -> list[
         each = " ± ".join(format_with_sigma(*(v / scale for v in channel.temperature)))
         out.append(f"temperature {each} {unit}/K, taken out")
     if math.isfinite(channel.filtered_hz):
-        out.append(f"above {channel.filtered_hz:.3g} Hz it is filtered, or hums")
+        out.append(
+            f"above {channel.filtered_hz:.2g} Hz parts are left out: it is filtered"
+            " there, or hums"
+        )
     if channel.dispersion > 1:
         out.append(
             f"scatters {channel.dispersion**0.5:.2f} times as much as its processes"

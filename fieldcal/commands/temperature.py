@@ -95,7 +95,8 @@ def read_points(paths: Sequence[Path]) -> list[ThermalPoint]:
     Raises
     ------
     InputError
-        If a calibration cannot be used, or they are of several devices.
+        If a calibration cannot be used or is there twice, or they are of several
+        devices.
 
     """
     from fieldcal.commands.compare import read_calibration
@@ -110,7 +111,21 @@ def read_points(paths: Sequence[Path]) -> list[ThermalPoint]:
     if len(serials) > 1:
         listed = ", ".join(f"{name} of {serial}" for serial, name in serials.items())
         raise InputError(f"{listed}: give sessions of one device")
+    _check_distinct(points)
     return points
+
+
+def _check_distinct(points: Sequence[ThermalPoint]) -> None:
+    """Refuse a calibration that is there twice: it would count as two that agree."""
+    known: dict[bytes, str] = {}
+    for point in points:
+        key = point.calibration.values.tobytes()
+        if key in known:
+            raise InputError(
+                f"{known[key]} and {point.name} are the same calibration: give each"
+                " session once"
+            )
+        known[key] = point.name
 
 
 def fit_model(points: Sequence[ThermalPoint], limits: Path | None) -> ThermalModel:

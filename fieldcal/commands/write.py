@@ -90,10 +90,10 @@ def propose_changes(
 
     """
     from fieldcal.calibration import Nominal
+    from fieldcal.drivers.mavlink_installed import GYRO_CAL_AT_START, replaced_at_start
     from fieldcal.install.proposal import (
         changes,
         installed_in,
-        replaced_at_start,
         unsupported_parameters,
     )
 
@@ -104,7 +104,11 @@ def propose_changes(
             " record it over mavlink:, or write a file by fieldcal export"
         )
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
-    says = (*unsupported_parameters(found), *replaced_at_start(installed))
+    averages = installed.values.get(GYRO_CAL_AT_START, 0.0)
+    says = (
+        *unsupported_parameters(found),
+        *replaced_at_start(installed.instance, averages),
+    )
     return changes(found, nominal, installed), installed, says
 
 
@@ -114,12 +118,12 @@ def _check_installable(
     installed: InstalledCalibration,
     force: bool,
 ) -> None:
+    from fieldcal.commands.decision_view import reasons_against
     from fieldcal.install.proposal import problems
 
-    decision = found.info.get("decision")
-    reasons = list(decision["reasons"]) if decision else ["nobody decided about it"]
-    if decision and decision["go"] and found.good:
-        reasons = []
+    reasons = reasons_against(found)
+    if not found.info.get("decision"):
+        reasons = ["nobody decided about it"]
     reasons += problems(tuple(wanted), installed)
     if reasons and not force:
         raise InstallRefused(

@@ -10,7 +10,8 @@ so INS_ACCOFFS = b with the same sign, and INS_ACCSCAL = 1 / s. If the autopilot
 a calibration to U already, both are combined, see `mavlink_installed`. The parameters
 do not include cross-coupling and gyroscope scale; a notice states the resulting error.
 
-Units: m/s^2, rad/s. Source: ArduPilot's parameter list, INS_*.
+Units: m/s^2, rad/s. Sources: ArduPilot's parameter list, INS_*; AccelCalibrator.cpp and
+accel_calibrated_ok_all in AP_InertialSensor.cpp.
 """
 
 from __future__ import annotations
@@ -27,9 +28,12 @@ from fieldcal.calibration.names import sensor_of
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
+    GYRO_CAL_AT_START,
     InstalledCalibration,
+    check_number,
     identity_parameters,
     parameter_names,
+    replaced_at_start,
 )
 from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_atomically
@@ -41,7 +45,7 @@ WRITTEN = ("acc_bias", "acc_scale", "gyr_bias")
 """Groups that autopilots have parameters for."""
 
 LARGEST_OFFSET, LARGEST_SCALE_ERROR = 3.5, 0.2
-"""Largest offset, m/s^2, and difference of a scale from 1 that ArduPilot accepts."""
+"""Range of an offset, m/s^2, and of a scale about 1 in ArduPilot's parameter list."""
 
 
 class ArdupilotParameters(NamedTuple):
@@ -76,23 +80,35 @@ def parameters(
     Raises
     ------
     InputError
-        If `installed` is incomplete, of another program, or of a rotated board; or if
-        neither biases nor scales were determined.
+        If `installed` is incomplete, of another program, or of a rotated board; if
+        the program has no such sensor; or if neither biases nor scales were determined.
 
     """
     found = autopilot_parameters(ARDUPILOT, calibration, nominal, installed, instance)
-    wide = [
-        f"{name} = {value:.4g} is beyond what ArduPilot takes: it will say that the "
-        "sensor is not calibrated"
-        for name, value in found.values.items()
-        if (
-            name.startswith("INS_ACC")
-            and "OFFS" in name
-            and abs(value) > LARGEST_OFFSET
+    return ArdupilotParameters(
+        found.values, (*found.notices, *_as_ardupilot_judges(found.values))
+    )
+
+
+def _as_ardupilot_judges(values: Mapping[str, float]) -> Iterator[str]:
+    """Sentences about values that ArduPilot does not take for a calibration's.
+
+    Its own calibration has none outside of the range of its list, and to its check
+    before arming an accelerometer with the offsets 0, 0, 0 is not calibrated.
+    """
+    offsets = {n: v for n, v in values.items() if "ACC" in n and "OFFS" in n}
+    scales = {n: v - 1 for n, v in values.items() if "SCAL" in n}
+    for some, most in ((offsets, LARGEST_OFFSET), (scales, LARGEST_SCALE_ERROR)):
+        for name in (n for n, off in some.items() if abs(off) > most):
+            yield (
+                f"{name} = {values[name]:.4g} is outside of the range in ArduPilot's"
+                " parameter list: check the unit of the recording"
+            )
+    if offsets and not any(offsets.values()):
+        yield (
+            f"{', '.join(offsets)} are 0: ArduPilot takes that for an accelerometer"
+            " that was never calibrated, and does not arm; determine acc_bias"
         )
-        or ("SCAL" in name and abs(value - 1) > LARGEST_SCALE_ERROR)
-    ]
-    return ArdupilotParameters(found.values, (*found.notices, *wide))
 
 
 def autopilot_parameters(
@@ -109,6 +125,7 @@ def autopilot_parameters(
             "out: export the format of that program"
         )
     device = installed or _nothing_installed(autopilot, instance)
+    check_number(autopilot, device.instance)
     start = nominal or Nominal()
     start = start if installed is None else installed.nominal(start)
     acc, gyr = (
@@ -183,10 +200,15 @@ def write(source: ExportSource, path: Path) -> list[str]:
     found = parameters(
         source.calibration, source.nominal, source.installed, source.instance
     )
+    says = list(found.notices)
+    if "gyr_bias" in source.calibration.groups:
+        told = source.installed.values if source.installed else {}
+        number = source.installed.instance if source.installed else source.instance
+        says += replaced_at_start(number, told.get(GYRO_CAL_AT_START))
     lines = [
         "# fieldcal: true = (raw - OFFS) * SCAL, m/s^2 and rad/s, sensor axes",
-        *(f"# {sentence}" for sentence in found.notices),
+        *(f"# {sentence}" for sentence in says),
         *(f"{name},{value:.9g}" for name, value in found.values.items()),
     ]
     write_atomically(path, "\n".join(lines) + "\n")
-    return list(found.notices)
+    return says

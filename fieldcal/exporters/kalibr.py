@@ -13,7 +13,8 @@ The noise density is that of means over 1 s within the windows of the session,
 
     N^2 = <(y_k+1 - y_k)^2> / 2 * 1 s                                              (3)
 
-of the noisiest axis of each triad. The random walk needs hours at rest and is not
+of the noisiest axis of each triad, +- sqrt(3 / n) / 2 of it by n differences: each mean
+is in two of them. The random walk needs hours at rest and is not
 filled in. If the session has a noise.json, all four numbers are taken from it. Units:
 m/s^2, rad/s. Source: Kalibr wiki, IMU noise model and yaml formats.
 """
@@ -46,8 +47,11 @@ def split_rotation(matrix: Array) -> tuple[Array, Array]:
     return (signs @ r).T, (q @ signs).T
 
 
-def window_noise_density(session: Session) -> Array:
-    """Noise density of the six channels by (3); nan if no window is long enough."""
+def window_noise_density(session: Session) -> tuple[Array, Array]:
+    """Noise density of the six channels by (3), (6,), and its standard error.
+
+    Both are nan if no window is long enough.
+    """
     squares, many = np.zeros(6), np.zeros(6)
     block = session.block  # before its windows, which reading corrects
     for window in session.windows:
@@ -57,8 +61,9 @@ def window_noise_density(session: Session) -> Array:
         steps = np.diff(means, axis=0) ** 2
         squares += np.nansum(steps, axis=0)
         many += np.isfinite(steps).sum(axis=0)
-    variance = squares / np.where(many > 0, 2 * many, np.nan)
-    return np.sqrt(variance * MEAN_S)  # (3)
+    n = np.where(many > 0, many, np.nan)
+    density = np.sqrt(squares / (2 * n) * MEAN_S)  # (3)
+    return density, density * np.sqrt(3 / n) / 2
 
 
 def _means(block: Block) -> Array:
@@ -104,13 +109,13 @@ def write(source: ExportSource, path: Path) -> list[str]:
 
 def _densities_of_windows(session: Session, says: list[str]) -> list[str]:
     """Lines with the noise densities of the session's windows, (3)."""
-    noise, lines = window_noise_density(session), []
+    (noise, error), lines = window_noise_density(session), []
     six = session.block.six
     for name, part in (("accelerometer", ACC), ("gyroscope", GYR)):
-        values = noise[part]
-        known = values[np.isfinite(values)]
-        if len(known):
-            lines.append(f"{name}_noise_density: {known.max():.6g}")
+        if np.isfinite(noise[part]).any():
+            i = int(np.nanargmax(noise[part]))
+            value = _yaml_number(float(f"{noise[part][i]:.6g}"))
+            lines.append(f"{name}_noise_density: {value}  # +- {error[part][i]:.2g}")
         else:
             lines.append(f"# {name}_noise_density: not determined")
             why = "no window of the session lasts 2 s"

@@ -5,12 +5,14 @@ PX4 corrects a sample r of a sensor (topics sensor_accel, sensor_gyro)
     accelerometer  f = R (r - CAL_ACCn_OFF) CAL_ACCn_SCALE                         (1)
     gyroscope      w = R (r - CAL_GYROn_OFF)                                       (2)
 
-axis by axis in the sensor's frame, and R rotates it into the body frame. fieldcal has
+axis by axis in the sensor's frame, and R rotates it into the body frame. Number n is
+that whose CAL_ACCn_ID is the sensor's id; without one PX4 uses none. fieldcal has
 U = b + s f (true -> raw), so OFF = b with the same sign and SCALE = 1 / s. Samples of
 sensor_combined are already corrected by (1); their b and s are combined with the
 installed calibration, see `mavlink_installed`.
 
-Units: m/s^2, rad/s. Source: PX4's parameter reference, CAL_*.
+Units: m/s^2, rad/s. Sources: PX4's parameter reference, CAL_*; Accelerometer.cpp in
+its sensor_calibration.
 """
 
 from __future__ import annotations
@@ -48,11 +50,18 @@ def write(source: ExportSource, path: Path) -> list[str]:
     found = parameters(
         source.calibration, source.nominal, source.installed, source.instance
     )
+    says = list(found.notices)
+    if source.installed is None:
+        ids = (f"CAL_{triad}{source.instance}_ID" for triad in ("ACC", "GYRO"))
+        says.append(
+            f"PX4 takes these for the sensors whose ids {' and '.join(ids)} have: if"
+            " they are others, name the sensor's number by --instance"
+        )
     lines = [
         "# fieldcal: true = R (raw - OFF) * SCALE, m/s^2 and rad/s, sensor axes",
-        *(f"# {sentence}" for sentence in found.notices),
+        *(f"# {sentence}" for sentence in says),
         "# Vehicle-Id Component-Id Name Value Type",
         *(f"1\t1\t{n}\t{value:.9g}\t{FLOAT_TYPE}" for n, value in found.values.items()),
     ]
     write_atomically(path, "\n".join(lines) + "\n")
-    return list(found.notices)
+    return says

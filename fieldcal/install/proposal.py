@@ -17,11 +17,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import reduce_to_diagonal
-from fieldcal.drivers.mavlink_installed import (
-    GYRO_CAL_AT_START,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
 from fieldcal.session.folder import Session
 
 WIDEST = {"acc_offset": 3.5, "gyr_offset": 0.5}
@@ -30,7 +26,7 @@ WIDEST = {"acc_offset": 3.5, "gyr_offset": 0.5}
 UNITS = {"acc_offset": "m/s^2", "acc_scale": "1", "gyr_offset": "rad/s"}
 
 SCALES = (0.8, 1.2)
-"""Scales that an accelerometer can have; autopilots refuse others."""
+"""Scales that an accelerometer can have; calibrations by autopilots refuse others."""
 
 LEFT_OUT = ("gyr_scale", "cross_coupling", "gyro_cross_coupling")
 """Groups that autopilots have no parameters for."""
@@ -114,18 +110,6 @@ def unsupported_parameters(found: Calibration) -> tuple[str, ...]:
         f"{group} stays out: the autopilot has no parameter for it"
         for group in LEFT_OUT
         if group in found.groups
-    )
-
-
-def replaced_at_start(installed: InstalledCalibration) -> tuple[str, ...]:
-    """What of it an autopilot replaces when it starts, a sentence if it does."""
-    if not installed.values.get(GYRO_CAL_AT_START, 0.0):
-        return ()
-    first, *_ = parameter_names(installed.autopilot, installed.instance)["gyr_offset"]
-    return (
-        f"{GYRO_CAL_AT_START} = {installed.values[GYRO_CAL_AT_START]:g}: the autopilot"
-        f" averages its gyroscopes at each start and replaces {first.rstrip('XYZ')}X,"
-        f" Y, Z, whatever is written; set {GYRO_CAL_AT_START} = 0 to keep them",
     )
 
 

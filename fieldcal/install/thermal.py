@@ -32,7 +32,9 @@ from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
     PX4,
     ardupilot_prefix,
+    check_number,
     parameter_names,
+    replaced_at_start,
 )
 from fieldcal.thermal import ThermalCurve, ThermalModel
 from fieldcal.thermal.curves import TERMS
@@ -91,9 +93,11 @@ def thermal_parameters(
     Raises
     ------
     InputError
-        If the model has biases neither of accelerometers nor of gyroscopes.
+        If the model has biases neither of accelerometers nor of gyroscopes, or the
+        program no such sensor.
 
     """
+    check_number(autopilot, instance)
     known = parameter_names(autopilot, instance)
     values: dict[str, ThermalParameter] = {}
     for sensor in SENSORS:
@@ -111,8 +115,10 @@ def thermal_parameters(
             name: ThermalParameter(1 / s, sigma / s**2)
             for name, (s, sigma) in _zip(known["acc_scale"], scale)
         }
-    said = (*_says(model), *_of_program(autopilot, instance, ids))
-    return ThermalParameters(values, said)
+    said = [*_says(model), *_of_program(autopilot, instance, ids)]
+    if autopilot == ARDUPILOT and model.of("gyr_bias") is not None:
+        said += replaced_at_start(instance)
+    return ThermalParameters(values, tuple(said))
 
 
 def id_names(instance: int) -> tuple[str, ...]:

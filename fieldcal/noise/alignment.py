@@ -2,9 +2,10 @@
 
     sigma_heading(T) = sigma_gyro(T) / (Omega cos(latitude))                       (1)
 
-with the error of a mean over T of the gyroscope that points east (the worst axis). It
-is least where flicker and random walk begin to exceed white noise. Source: D. Titterton
-and J. Weston, 2nd edition, section 10.4. Units: rad, s.
+with the error of a mean over T of the gyroscope that points east (the worst axis), by
+noise alone: what its bias has changed by since its calibration adds to it. It is least
+where flicker and random walk begin to exceed white noise. Source: D. Titterton and
+J. Weston, 2nd edition, section 10.4. Units: rad, s.
 """
 
 from __future__ import annotations

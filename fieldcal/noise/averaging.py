@@ -1,8 +1,9 @@
 """How long to average: the error of a mean against its length.
 
-The error of a mean over T, as seen against the next mean, is the Allan deviation
-sigma(T) of the channel's processes. It falls as N / sqrt(T) while noise is white, until
-flicker, random walk or a ramp contribute as much,
+The error of a mean over T is the Allan deviation sigma(T) of the channel's processes:
+half of the variance by which the next mean differs, to which both contribute. It falls
+as N / sqrt(T) while noise is white, until flicker, random walk or a ramp contribute as
+much,
 
     sigma^2(T) = 2 N^2 / T                                                         (1)
 

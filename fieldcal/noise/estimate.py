@@ -33,7 +33,8 @@ from fieldcal.noise.processes import PROCESS_UNITS
 from fieldcal.noise.reduction import CHANNELS as NOISY
 from fieldcal.noise.reduction import Reduction
 from fieldcal.noise.spectrum import CosineSpectrum
-from fieldcal.noise.terms import FILTERED_HZ, choose_processes
+from fieldcal.noise.terms import FILTERED_HZ, ChosenProcesses, choose_processes
+from fieldcal.noise.upper_limit import upper_limit
 
 MIN_STRETCH_S = 30.0
 """Shortest stretch from which noise is estimated, s."""
@@ -42,7 +43,7 @@ SAME_RATE = 0.02
 """Most by which rates of one device differ because of clocks, each off by 1 %."""
 
 MIN_DRAWS = 5
-"""Fewest draws with a process from which a limit for it is stated."""
+"""Fewest draws with a process from which its limit is taken."""
 
 WHITE_TIME_S = 1 / (2 * np.pi * FILTERED_HZ)
 """Correlation time below which noise acts as white on means over a second, s."""
@@ -83,7 +84,8 @@ class ChannelEstimate:
     pair : white noise and random walk for filters that have only these
     averaging : error of a mean against its length
     dispersion : as in `ChosenProcesses`
-    filtered_hz : above this frequency the outputs are filtered; inf where they are not
+    filtered_hz : lowest frequency of what is left out because the outputs are filtered,
+        or hum; inf where nothing is
 
     """
 
@@ -216,7 +218,7 @@ def _estimate_channel(spectrum: CosineSpectrum, i: int, warm: bool) -> ChannelEs
         CHANNELS[i],
         UNITS[i],
         processes,
-        _upper_limits(drawn, processes, UNITS[i]),
+        _upper_limits(spectrum, chosen, drawn, UNITS[i]),
         trends.get("temperature"),
         drawn,
         measured_allan_deviation(
@@ -276,19 +278,28 @@ def _white_noise_size(best: NoiseFit, alone: ProcessSize) -> ProcessSize:
 
 
 def _upper_limits(
-    drawn: tuple[SizeDraw, ...], found: dict[str, ProcessSize], unit: str
+    spectrum: CosineSpectrum,
+    chosen: ChosenProcesses,
+    drawn: tuple[SizeDraw, ...],
+    unit: str,
 ) -> dict[str, ProcessSize]:
-    """Upper limits (95 %) of processes that were not found."""
+    """Upper limits (95 %) of processes that were not found.
+
+    That of the draws which have the process, if there are some.
+    """
     out = {}
     for name, terms in (("B", ("B", "BT")), ("K", ("K",)), ("Q", ("Q",))):
-        if name in found:
+        if set(terms) & set(chosen.best.terms):
             continue
         sizes = [
             float(np.exp(max((d.x[i] for i, t in enumerate(d.terms) if t in terms))))
             for d in drawn
             if set(terms) & set(d.terms)
         ]
-        if len(sizes) >= MIN_DRAWS:
-            high = float(np.sqrt(np.quantile(sizes, 0.95)))
-            out[name] = ProcessSize(high, np.nan, PROCESS_UNITS[name].format(unit))
+        high = (
+            float(np.sqrt(np.quantile(sizes, 0.95)))
+            if len(sizes) >= MIN_DRAWS
+            else upper_limit(spectrum, chosen.powers, name, chosen.best.level)
+        )
+        out[name] = ProcessSize(high, np.nan, PROCESS_UNITS[name].format(unit))
     return out

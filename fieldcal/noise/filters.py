@@ -13,9 +13,10 @@ a filter with the step h, where noise is held for a step,
     white  N / sqrt(h),    bias  K / sqrt(h)   per second                          (2)
 
 h: EKF3 of ArduPilot 12 ms, EKF2 of PX4 10 ms. A covariance of single samples, as
-sensor_msgs/Imu has it, is N^2 times the rate. Sources: Kalibr wiki, IMU noise model;
-covariance prediction of EKF3 and EKF2, where a step adds (h w)^2 to an angle and
-(h h p)^2 to a bias times h.
+sensor_msgs/Imu has it, is N^2 times the rate: what a filter that takes them for
+independent needs. Samples of a device with a low-pass scatter by less. Sources: Kalibr
+wiki, IMU noise model; covariance prediction of EKF3 and EKF2, where a step adds
+(h w)^2 to an angle and (h h p)^2 to a bias times h.
 """
 
 from __future__ import annotations
@@ -26,12 +27,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import fit_processes, whittle_likelihood
+from fieldcal.noise.likelihood import fit_processes
 from fieldcal.noise.prediction import SizeDraw
 from fieldcal.noise.processes import allan_variance
 from fieldcal.noise.reference import most_probable_sizes
 from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import ChosenProcesses
+from fieldcal.noise.upper_limit import upper_limit
 
 STEP_S = {"ardupilot": 0.012, "px4": 0.01}
 PROGRAM_PARAMETERS = {
@@ -45,9 +47,6 @@ PROGRAM_PARAMETERS = {
     ),
 }
 """Parameters for white noise and bias of accelerometers, and of gyroscopes."""
-
-ONE_SIDED = 1.645
-"""Normal deviation that is exceeded in 5 of 100."""
 
 UNITS = ("m/s^2", "m/s^3", "rad/s", "rad/s^2")
 
@@ -94,7 +93,7 @@ def fit_filter_noise(
         factor = _left_out_factor(whole, size / tau)
         error = float(np.sqrt(one.covariance[0, 0])) / 2
         n = float(np.sqrt(size)) * factor
-        walk = factor * _walk_limit(spectrum, chosen, size)
+        walk = factor * upper_limit(spectrum, chosen.powers, "K", one.level)
         return FilterNoisePair(n, n * error, walk, np.nan, factor)
     pair = most_probable_sizes(spectrum, chosen.powers, pair)
     sizes, spread = np.exp(pair.x), np.sqrt(np.diag(pair.covariance)) / 2
@@ -105,25 +104,6 @@ def fit_filter_noise(
 
 def _left_out_factor(whole: Array, pair: Array) -> float:
     return float(np.sqrt(max(1.0, np.max(whole / pair))))  # (1)
-
-
-def _walk_limit(
-    spectrum: CosineSpectrum, chosen: ChosenProcesses, white: float
-) -> float:
-    """Upper limit (95 %) of K beside white noise of variance N^2.
-
-    It is the largest K whose likelihood is within a one-sided normal deviation of 1.64
-    of the greatest likelihood.
-    """
-    used = ~chosen.powers.free
-    power = chosen.powers.power[used].sum(axis=1)
-    count = chosen.powers.count[used].sum(axis=1)
-    walk, flat = (spectrum.fixed_columns[p][used] for p in ("K", "N"))
-    # from a negligible walk to one of a thousand times the noise
-    sizes = white * np.geomspace(1e-4, 1e4, 400) / float((walk / flat).max())
-    each = [whittle_likelihood(white * flat + k * walk, power, count) for k in sizes]
-    likely = np.flatnonzero(np.array(each) >= max(each) - ONE_SIDED**2 / 2)
-    return float(np.sqrt(sizes[likely[-1]]))
 
 
 def noisiest_axes(

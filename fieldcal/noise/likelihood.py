@@ -28,6 +28,9 @@ Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 TIMED_TERMS = ("G", "BT")
 """Terms that have a correlation time: Gauss-Markov, and flicker up to one."""
 
+ALIKE = 0.01
+"""Least difference of the logarithms of two correlation times."""
+
 MOST_STEPS = 60
 LONGEST_STEP = 1.5
 CLOSE = 1e-4
@@ -126,7 +129,7 @@ def whittle_likelihood(level: Array, power: Array, count: Array) -> float:
 def fit_processes(
     spectrum: CosineSpectrum, powers: Powers, terms: tuple[str, ...], start: Array
 ) -> NoiseFit | None:
-    """Fit processes by maximum likelihood; None if one of them vanishes."""
+    """Fit processes by maximum likelihood; None if one vanishes, or two are one."""
     used = ~powers.free
     power, count = powers.power[used].sum(axis=1), powers.count[used].sum(axis=1)
     within = parameter_bounds(spectrum, terms)
@@ -155,7 +158,17 @@ def fit_processes(
             return None
         if moved < CLOSE or (gained < 1e-6 and moved < 0.1):
             break
+    if _two_are_one(terms, x):
+        return None
     return _finished_fit(spectrum, powers, terms, x)
+
+
+def _two_are_one(terms: tuple[str, ...], x: Array) -> bool:
+    """Whether two Gauss-Markov processes have one time: only their sum is known."""
+    timed = [term for term in terms if term in TIMED_TERMS]
+    times = sorted(t for term, t in zip(timed, x[len(terms) :], strict=True)
+                   if term == "G")  # fmt: skip
+    return bool((np.diff(times) < ALIKE).any())
 
 
 def parameter_bounds(

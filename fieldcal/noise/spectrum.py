@@ -62,6 +62,8 @@ class CosineSpectrum:
     Attributes
     ----------
     frequency : (b,) Hz, middle of each bin
+    folded_from : (b,) Hz, the lowest one that means over samples fold onto it
+    folded_share : (b,) part of white noise's power there that is folded onto it
     power : (b, folds, c) sums of squares of the stretches below the last level
     count : (b, folds) how many
     last : coefficients of the last levels
@@ -82,6 +84,10 @@ class CosineSpectrum:
         self.frequency = np.concatenate(
             [(e[:-1] + e[1:] - 1) / (4 * n * m * self.dt) for n, m, e in self._parts]
         )
+        many = np.concatenate([np.full(len(e) - 1, m) for _, m, e in self._parts])
+        self.folded_from = 1 / (many * self.dt) - self.frequency
+        half = np.pi * self.frequency * self.dt
+        self.folded_share = 1 - (np.sin(many * half) / (many * np.sin(half))) ** 2
 
     def _below(self) -> None:
         """Sums of the levels below the last ones, of all stretches together."""

@@ -39,7 +39,10 @@ def consequences(found: NoiseResult) -> list[str]:
     if found.alignment is not None:
         seconds, sigma, spread = found.alignment.best
         angle = " ± ".join(format_with_sigma(math.degrees(sigma), math.degrees(spread)))
-        out.append(f"north by gyrocompassing: {angle}° after {seconds:.0f} s")
+        out.append(
+            f"north by gyrocompassing, by noise alone: {angle}° after {seconds:.0f} s;"
+            " what a bias has changed by since its calibration adds to it"
+        )
     return out
 
 

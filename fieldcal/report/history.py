@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.calibration import COMPONENTS, Calibration, compare
-from fieldcal.calibration.wording import TITLES, format_unit, parameter_title
+from fieldcal.calibration.wording import (
+    TITLES,
+    format_unit,
+    format_with_sigma,
+    parameter_title,
+)
 from fieldcal.core.errors import InputError
 from fieldcal.report.blocks import Cell, Figure, ReportBlock, Section, table
 from fieldcal.report.charts import Axis, Chart, Series
@@ -27,7 +32,9 @@ def history_section(material: ReportMaterial) -> Section | None:
     rows = _changes(material.earlier[-1], now)
     if rows:
         caption = f"Change since {material.earlier[-1].label}"
-        blocks.append(table(caption, ("parameter", ">change", "unit", ">in σ"), rows))
+        blocks.append(
+            table(caption, ("parameter", ">change ± 1σ", "unit", ">in σ"), rows)
+        )
     return Section("history", "History of the device", tuple(blocks))
 
 
@@ -64,9 +71,11 @@ def _changes(before: EarlierCalibration, now: Calibration) -> list[list[str | Ce
     return [
         [
             parameter_title(name),
-            f"{d:+.2g}",
+            " ± ".join(format_with_sigma(float(d), float(s))),
             format_unit(units[name]),
             Cell(f"{z:+.1f}", "warn" if name in found.changed else ""),
         ]
-        for name, d, z in zip(found.names, found.difference, found.z, strict=True)
+        for name, d, s, z in zip(
+            found.names, found.difference, found.sigma, found.z, strict=True
+        )
     ]

@@ -2,11 +2,12 @@
 
     sigma^2(tau) = <(y_k+1 - y_k)^2> / 2          y: means over tau, overlapping
 
-It is the standard error of a mean over tau s as an estimate of the next mean. It falls
-as 1/sqrt(tau) for white noise, is constant for flicker (the bias instability), and
-rises for a random walk, for which a longer mean is less accurate. Device axes, SI.
-Source: IEEE 952-1997 annex C; intervals by Greenhall and Riley 2003. The sums are
-allantools', which fieldcal installs as its extra ``allan``.
+It is the standard error of a mean over tau s: its square is half of that by which the
+next mean differs, to which both contribute. It falls as 1/sqrt(tau) for white noise, is
+constant for flicker (the bias instability), and rises for a random walk, for which a
+longer mean is less accurate. Device axes, SI. Source: IEEE 952-1997 annex C; intervals
+by Greenhall and Riley 2003. The sums are allantools', which fieldcal installs as its
+extra ``allan``.
 """
 
 from __future__ import annotations

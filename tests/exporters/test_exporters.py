@@ -27,6 +27,7 @@ from fieldcal.drivers.mavlink_installed import (
     parameter_names,
 )
 from fieldcal.exporters import ExportSource, ardupilot, format_names, load_exporter, px4
+from fieldcal.exporters.kalibr import window_noise_density
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.session.sample_files import find_samples
@@ -64,6 +65,35 @@ def test_an_autopilot_corrects_raw_samples_as_apply_does(
         np.testing.assert_allclose(acc, cal.apply(raw).acc, atol=1e-12)
         np.testing.assert_allclose(gyr, cal.apply(raw).gyr, atol=1e-12)
         assert not found.notices
+
+
+def test_what_ardupilot_would_not_take_for_a_calibration_is_said() -> None:
+    """Outside of its list's range; and 0, 0, 0, with which it does not arm."""
+    cal = calibration(np.random.default_rng(1), 0.0)
+    wide = replace(cal, values=np.where([n == "acc_bias.y" for n in cal.names], 4.0,
+                                        cal.values))  # fmt: skip
+    (said,) = ardupilot.parameters(wide).notices
+    assert said.startswith("INS_ACCOFFS_Y = 4 is outside of the range")
+    scales = without(cal, *(f"acc_bias.{axis}" for axis in "xyz"))
+    assert any("does not arm" in s for s in ardupilot.parameters(scales).notices)
+    assert not any("not arm" in s for s in px4.parameters(scales).notices)
+
+
+def test_px4_has_four_sensors_and_ardupilot_five() -> None:
+    cal = calibration(np.random.default_rng(1), 0.0)
+    assert px4.parameters(cal, instance=3) and ardupilot.parameters(cal, instance=4)
+    with pytest.raises(InputError, match="no sensor 4: its last one is 3"):
+        px4.parameters(cal, instance=4)
+
+
+def test_what_the_programs_do_with_a_file_is_said(
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
+) -> None:
+    """ArduPilot averages its gyroscopes at each start; PX4 goes by the sensors' ids."""
+    says = load_exporter("ardupilot").write(made[0], tmp_path / "a.param")
+    assert any("unless INS_GYR_CAL = 0" in s and "INS_GYROFFS_X" in s for s in says)
+    says = load_exporter("px4").write(made[0], tmp_path / "p.params")
+    assert any("CAL_ACC0_ID and CAL_GYRO0_ID" in s for s in says)
 
 
 def test_ardupilot_numbers_its_fourth_imu_before_the_sensor() -> None:
@@ -282,6 +312,22 @@ def test_kalibr_predicts_what_was_recorded(
     assert "accelerometer_random_walk" not in told
 
 
+@pytest.mark.statistical
+def test_a_density_of_windows_has_the_error_that_is_told(tmp_path: Path) -> None:
+    """Scatter of 90 windows of white noise, 12 s each, in stated errors."""
+    rng, pulls = np.random.default_rng(5), []
+    for number in range(15):
+        folder, n = tmp_path / str(number), 1200
+        values = rng.normal(0, 0.3, (n, 6))
+        tables = {"format": 1, "device": {"name": "t"}, "position": [{}]}
+        with Recorder(folder, tables) as recorder:
+            recorder.append(Block.of(np.arange(n) / 100, values[:, :3], values[:, 3:]))
+            recorder.mark("window", position=0, start_s=0.0, end_s=12.0)
+        density, error = window_noise_density(Session.open(folder))
+        pulls += ((density - 0.03) / error).tolist()
+    assert abs(np.mean(pulls)) < 0.5 and 0.7 < np.std(pulls) < 1.3
+
+
 def test_imu_calib_corrects_by_sm_u_minus_bias(
     made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
@@ -379,6 +425,36 @@ def test_what_was_not_determined_is_said_not_filled_in_silence(
     says = load_exporter("ardupilot").write(some, tmp_path / "a.param")
     assert "gyr_bias was not determined: not written" in says
     assert "GYR" not in (tmp_path / "a.param").read_text().partition("INS_")[2]
+
+
+@pytest.mark.parametrize(
+    ("good", "decision", "expected"),
+    [
+        (True, {"go": True, "reasons": []}, None),
+        (True, None, None),
+        (True, {"go": False, "reasons": ["it was too warm"]}, "NO-GO: it was too warm"),
+        (False, None, "NO-GO: the calibration is bad: two axes are swapped"),
+        (False, {"go": True, "reasons": []}, "NO-GO: the calibration is bad: two axes"),
+    ],
+)
+def test_what_is_not_to_be_used_is_not_handed_on_in_silence(
+    good: bool,
+    decision: dict[str, Any] | None,
+    expected: str | None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rng = np.random.default_rng(9)
+    info = {"decision": decision} if decision else {}
+    warnings = () if good else ("two axes are swapped",)
+    cal = replace(calibration(rng, 0.0), good=good, info=info, warnings=warnings)
+    source(tmp_path / "s", cal, samples(rng))
+    place, out = str(tmp_path / "s"), str(tmp_path / "out.csv")
+    for call in (["export", place, "--format", "csv", "-o", f"{out}.csv"],
+                 ["apply", place, out]):  # fmt: skip
+        assert main(call) == 0
+        said = capsys.readouterr().err
+        assert expected in said if expected else "NO-GO" not in said
 
 
 def test_apply_says_of_which_axes_the_nominal_values_are_taken(

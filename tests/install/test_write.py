@@ -237,6 +237,15 @@ def test_no_go_is_not_written_unless_forced(
     assert "INS_ACCOFFS_X," in out.read_text()
 
 
+def test_what_is_bad_is_not_written_whatever_was_decided(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = replace(calibration(), good=False, warnings=("two axes are swapped",))
+    folder = make(tmp_path / "s", bad, installed())
+    assert main(["write", str(folder), "-o", str(tmp_path / "new.param")]) == 1
+    assert "two axes are swapped" in capsys.readouterr().err
+
+
 def test_parameters_changed_since_the_recording_are_not_written_over(
     session: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from few_channels import only
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
 from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.errors import InputError
@@ -217,6 +217,65 @@ def test_a_filter_in_the_device_does_not_make_white_noise_smaller() -> None:
 
 
 @pytest.mark.statistical
+@pytest.mark.statistical
+@pytest.mark.parametrize(("rate", "corner", "order"), [(100, 5, 2), (200, 20, 2)])
+def test_the_bend_of_a_filter_below_its_corner_is_not_taken_for_less_noise(
+    rate: int, corner: int, order: int
+) -> None:
+    """Errors of white noise in stated ones: they are no larger than these, about 0."""
+    taps = butter(order, corner / (rate / 2))
+    pulls = []
+    for seed in range(2):
+        drawn = np.random.default_rng(seed).standard_normal((600 * rate, 6))
+        values = lfilter(*taps, drawn * np.sqrt(rate), axis=0)
+        reduced = reduce_recording([recording(values, 1 / rate)])
+        for channel in estimate_noise([reduced]).channels.values():
+            white = channel.processes["N"]
+            pulls.append((white.value - 1) / white.sigma)
+    assert np.mean(pulls) > -1 and np.sqrt(np.mean(np.square(pulls))) < 1.6
+
+
+def test_a_minute_that_looks_filtered_by_chance_still_tells_its_white_noise() -> None:
+    """The one of 150 recordings of 600 samples whose bins above 1 Hz look odd."""
+    values = noise(np.random.default_rng(10), 600, DT, 6, N=1.0)
+    made = estimate_noise([reduce_recording([recording(values, DT)])])
+    white = made.channels["gy"].processes["N"]
+    assert made.channels["gy"].filtered_hz < 5
+    assert abs(white.value - 1) < 0.15
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize(("name", "size"), [("K", 0.02), ("B", 0.05), ("Q", 0.02)])
+def test_every_process_is_found_or_has_a_limit_that_holds(
+    name: str, size: float
+) -> None:
+    """Of 18 channels with a process that is hardly seen, two limits may be too low."""
+    holds = []
+    for seed in range(3):
+        values = noise(np.random.default_rng(seed), 3000, DT, 6, N=1.0, **{name: size})
+        made = estimate_noise([reduce_recording([recording(values, DT)])])
+        for channel in made.channels.values():
+            assert {*channel.processes, *channel.limits} >= {"N", "B", "K", "Q"}
+            if name in channel.limits:
+                limit = channel.limits[name].value
+                assert limit < 20 * size
+                holds.append(limit > size)
+    assert len(holds) > 9 and sum(holds) >= len(holds) - 2
+
+
+def test_two_processes_of_the_same_time_are_one() -> None:
+    levels = CosineLevels(DT, 1, 1)
+    levels.add(noise(np.random.default_rng(40), 3000, DT, 1, N=1.0, s=1.0, T=2.0))
+    spectrum = CosineSpectrum([levels.reduced()], 1)
+    power, count = spectrum.channel_powers(
+        0, spectrum.last.values[:, 0], np.ones(len(spectrum.last.bin))
+    )
+    powers = Powers(power, count, np.zeros(len(power), dtype=bool))
+    assert fit_processes(spectrum, powers, ("N", "G"), np.log([1.0, 1.0, 2.0]))
+    same = np.log([1.0, 0.5, 0.5, 2.0, 2.0])
+    assert fit_processes(spectrum, powers, ("N", "G", "G"), same) is None
+
+
 def test_a_filter_in_the_device_is_no_ramp_and_hides_none() -> None:
     """White noise of N behind a low-pass: a slope is known to N sqrt(12 / T^3)."""
     rng, dt, n = np.random.default_rng(17), 0.02, 60_000

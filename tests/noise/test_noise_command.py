@@ -18,8 +18,10 @@ from few_channels import only
 from pyarrow import csv, parquet
 
 from benchmarks.noise.processes import noise, recording
+from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.samples import Block, concat
+from fieldcal.history.store import History
 from fieldcal.noise.document import NoiseResult
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
@@ -121,7 +123,7 @@ def test_the_screen_fits_80_columns_and_every_number_has_its_uncertainty(
     assert len(tables) == 12 and max(map(len, tables)) <= 80
     assert all("±" in line for line in tables)
     for word in ("instability", "over 60 s", "kalibr:", "EK3_GBIAS_P_NSE", "EKF2_ACC",
-                 "recalibrate:", "north by gyrocompassing", "written:"):  # fmt: skip
+                 "recalibrate:", "north", "by noise alone", "written:"):  # fmt: skip
         assert word in told.screen
 
 
@@ -145,6 +147,34 @@ def test_several_sessions_of_a_device_count_together(
     assert both["stretches"] == 2 and both["seconds"] == pytest.approx(1200, abs=1)
     sigma = [x["channels"]["ax"]["processes"]["N"]["sigma"] for x in (both, one)]
     assert sigma[0] < 0.9 * sigma[1]
+
+
+def test_the_history_tells_when_to_recalibrate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Four calibrations of one axis, of which one was stored late."""
+    folder = session(tmp_path / "night", 60, serial="A1")
+    history = History(tmp_path / "history")
+    about = {"device": {"serial": "A1"}, "decision": {"go": True}}
+    for month, bias in ((4, 0.3), (1, 0.1), (3, 0.2), (2, 0.0)):
+        found = Calibration(
+            "joint", ("acc_bias.x",), np.array([bias]), np.array([[1e-8]]), ("m/s^2",),
+            1.0, 1, 1e-3, info=about,
+        )  # fmt: skip
+        history.add(f"2026-0{month}-01T10:00:00", tmp_path / str(month), found)
+    arguments = ["noise", str(folder), "--json", "--history"]
+    assert main([*arguments, str(tmp_path / "history")]) == 0
+    told = json.loads(capsys.readouterr().out)["recalibrate"]
+    assert told["since"].startswith("2026-04-01T10:00")
+    assert [n for n, r in told["channels"].items() if r["from_history"]] == ["ax"]
+    # a month changes it by 0.15 m/s^2, far more than any limit
+    assert told["channels"]["ax"]["after_s"][1] < 86400
+
+
+def test_a_session_counts_once(told: Told, capsys: pytest.CaptureFixture[str]) -> None:
+    again = told.folder.parent / "." / told.folder.name / ".." / told.folder.name
+    assert main(["noise", str(told.folder), str(again)]) == 2
+    assert "is there twice: give each session once" in capsys.readouterr().err
 
 
 def test_sessions_of_two_devices_are_refused(

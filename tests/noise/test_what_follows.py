@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from few_channels import only
 from scipy.signal import lfilter
+from scipy.special import ndtr
 
 from benchmarks.noise.processes import noise, recording
 from fieldcal.core.frames import EARTH_RATE
@@ -21,12 +22,9 @@ from fieldcal.noise.filters import (
     program_parameters,
     ros_covariances,
 )
+from fieldcal.noise.history_walk import SHARES, WALKS, EarlierBias, walk_from_history
 from fieldcal.noise.prediction import SizeDraw
-from fieldcal.noise.recalibration import (
-    HistoryStep,
-    recalibration_time,
-    walk_from_history,
-)
+from fieldcal.noise.recalibration import MAX_INTERVAL_S, recalibration_time
 
 DAY = 86400.0
 
@@ -35,6 +33,17 @@ def drawn(**sizes: float) -> tuple[SizeDraw, ...]:
     """One draw: processes exactly so large."""
     terms = tuple(sizes)
     return (SizeDraw(terms, 2 * np.log(list(sizes.values()))),)
+
+
+def monthly(
+    rng: np.random.Generator, count: int, walk: float, sigma: float, common: float = 0.0
+) -> list[EarlierBias]:
+    """Calibrations a month apart, a share of their variance common to all."""
+    walked = walk * math.sqrt(30 * DAY) * np.cumsum(rng.standard_normal(count))
+    alike = math.sqrt(common) * rng.standard_normal()
+    own = math.sqrt(1 - common) * rng.standard_normal(count)
+    values = walked + sigma * (alike + own)
+    return [EarlierBias(30 * DAY * i, v, sigma**2) for i, v in enumerate(values)]
 
 
 def test_averaging_is_best_where_white_noise_and_walk_meet() -> None:
@@ -160,7 +169,7 @@ def test_a_bias_is_a_mean_and_no_single_sample(time: float) -> None:
     for lag in (20, 2000):
         change = np.std(means[lag:] - means[:-lag])
         spread = math.sqrt(change**2 - alone)
-        for limit, past in ((1.96 * spread * 1.1, False), (1.96 * spread / 1.1, True)):
+        for limit, past in ((1.96 * spread * 1.15, False), (1.96 * spread / 1.1, True)):
             found = recalibration_time(known, 0.0, limit, float(alone)).seconds[0]
             assert (found <= 30 * lag * 1.2) is past, (lag, limit, found)
 
@@ -183,9 +192,8 @@ def test_a_ramp_that_goes_on_is_told_from_a_walk_that_was_not_seen() -> None:
 def test_a_walk_that_would_not_be_seen_counts_where_none_is() -> None:
     seen = recalibration_time(drawn(N=1e-9, K=1e-6), 0.0, 5e-4, 0.0, unseen=1e-5)
     none = recalibration_time(drawn(N=1e-9), 0.0, 5e-4, 0.0, unseen=1e-6)
-    assert (
-        none.seconds == seen.seconds and none.by_unseen_walk and not seen.by_unseen_walk
-    )
+    assert none.seconds == pytest.approx(seen.seconds)
+    assert none.by_unseen_walk and not seen.by_unseen_walk
     # 1.96 K sqrt(t) = limit
     assert none.seconds[0] == pytest.approx((5e-4 / 1.96e-6) ** 2, rel=0.15)
 
@@ -193,15 +201,51 @@ def test_a_walk_that_would_not_be_seen_counts_where_none_is() -> None:
 def test_what_history_shows_counts_more_than_an_hour() -> None:
     rng = np.random.default_rng(33)
     k = 1e-7
-    steps = [
-        HistoryStep(30 * DAY, k * math.sqrt(30 * DAY) * float(z), 1e-12)
-        for z in rng.standard_normal(400)
-    ]
-    assert math.sqrt(walk_from_history(steps)) == pytest.approx(k, rel=0.1)
-    found = recalibration_time(drawn(N=1e-6, K=1e-5), 1e-6, 1e-3, 0.0, steps)
+    earlier = monthly(rng, 401, k, 1e-6)
+    assert np.sqrt(walk_from_history(earlier)) == pytest.approx(k, rel=0.15)
+    found = recalibration_time(drawn(N=1e-6, K=1e-5), 1e-6, 1e-3, 0.0, earlier)
     assert found.from_history
     # 1.96 k sqrt(t) = limit
     assert found.seconds[0] == pytest.approx((1e-3 / 1.96 / k) ** 2, rel=0.25)
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("count", [4, 6])
+@pytest.mark.parametrize("common", [0.0, 0.9])
+@pytest.mark.parametrize("walk", [0.5, 1.0, 2.0])
+def test_errors_of_a_few_calibrations_hide_no_walk(
+    count: int, common: float, walk: float
+) -> None:
+    """The chance to be beyond the limit at the dates is hardly more than is said."""
+    rng, sigma, limit = np.random.default_rng(34), 0.004, 0.02
+    k = walk * sigma / math.sqrt(30 * DAY)
+    chances = []
+    for _ in range(60):
+        earlier = monthly(rng, count, k, sigma, common)
+        dates = recalibration_time(drawn(N=1e-9), 0.0, limit, 0.0, earlier).seconds
+        at = np.minimum(dates, MAX_INTERVAL_S)
+        chances.append(2 * ndtr(-limit / k / np.sqrt(at)))
+    assert (np.mean(chances, axis=0) < (0.15, 0.5)).all()
+
+
+def test_the_walk_of_a_history_has_the_density_of_its_changes() -> None:
+    """Against the dense covariance of the changes, times unevenly apart."""
+    times, values, sigma = np.array([0.0, 1.0, 4.0, 9.0]), [0.0, 2.0, 1.0, 6.0], 0.8
+    variances = sigma**2 * np.array([1.0, 2.0, 0.5, 1.0])
+    d = np.diff(np.eye(4), axis=0)
+    sizes, off = np.geomspace(1e-6, 1e5, 2000), d @ values
+    density = np.zeros(len(sizes))
+    for share, prior in SHARES.items():
+        for j, size in enumerate(sizes):
+            grown = size * np.diag(np.diff(times))
+            whole = grown + (1 - share) * (d * variances) @ d.T
+            part = np.linalg.solve(whole, grown)
+            p = prior * np.sqrt(np.trace(part @ part) / np.linalg.det(whole))
+            density[j] += p * np.exp(-0.5 * off @ np.linalg.solve(whole, off))
+    below = np.cumsum(density)
+    expected = np.interp((np.arange(WALKS) + 0.5) / WALKS, below / below[-1], sizes)
+    earlier = [EarlierBias(*row) for row in zip(times, values, variances, strict=True)]
+    np.testing.assert_allclose(walk_from_history(earlier), expected, rtol=0.1)
 
 
 def test_north_is_as_sure_as_the_worst_gyroscope_is_still() -> None:

@@ -480,7 +480,9 @@ def test_the_command_writes_where_it_is_told_and_says_what_is_missing(
     page = tmp_path / "page.html"
     call = ["report", str(bench), "-o", str(page), "--earlier", str(bench)]
     assert main(call) == 0
-    assert "History of the device" in page.read_text("utf-8")
+    history = page.read_text("utf-8").partition("History of the device")[2]
+    changes = history.partition("change ± 1σ")[2].partition("</table>")[0]
+    assert changes.count(" ± ") == changes.count("<tr>") > 0
     assert main(["report", str(bench), "--earlier", str(tmp_path)]) == 2
     assert "no result there" in capsys.readouterr().err
     monkeypatch.setenv("PATH", str(tmp_path))

@@ -89,6 +89,24 @@ def at(of: Warming, temperature: float, serial: str = "A1") -> Calibration:
     return session(of, temperature, np.zeros(len(covariance)), covariance, serial)
 
 
+def test_a_session_counts_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A copy of one: its ± would be that of two that agree, and ten times too small."""
+    of, rng = drawn(np.random.default_rng(1)), np.random.default_rng(2)
+    covariance = exact(of)
+    paths = [tmp_path / name for name in ("a.json", "b.json", "c.json", "copy.json")]
+    for path, t in zip(paths, (5, 20, 40, 5), strict=True):
+        error = np.sqrt(np.diag(covariance)) * rng.standard_normal(len(covariance))
+        found = session(of, t, error, covariance)
+        path.write_text(json.dumps(found.to_json()))
+    assert main(["temperature", *map(str, paths)]) == 0
+    paths[3].write_text(paths[0].read_text())
+    assert main(["temperature", *map(str, paths)]) == 2
+    said = capsys.readouterr().err
+    assert f"{paths[0]} and {paths[3]} are the same calibration" in said
+
+
 def test_sessions_of_two_devices_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,0 +1,77 @@
+"""The random walk of a bias over months, from a device's earlier calibrations.
+
+A bias x_i was known at the time t_i with the variance V_i. Of this a share r is an
+error that all calibrations have in common, as of base, fixture and what the factory
+left; it does not affect differences. With h the times between them and D the matrix of
+their differences,
+
+    D x ~ N(0, K^2 diag h + (1 - r) D diag V D')                                   (1)
+
+In the axes of diag(h)^-1/2 D diag V D' diag(h)^-1/2, with a its eigenvalues and z the
+differences there, the density of ln K^2 and r with the reference prior is
+
+    ln p = ln p(r) - sum (ln l + z^2 / l) / 2 + ln(sum (K^2 / l)^2) / 2            (2)
+    l = K^2 + (1 - r) a
+
+Few calibrations do not exclude a walk that their own errors hide, so all of p is kept
+and not its maximum. Symbols: x, V of the channel's unit and its square, t and h s,
+K the unit per sqrt(s). Source: Jeffreys 1946.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+
+SHARES = {0.0: 0.5, 0.3: 1 / 6, 0.7: 1 / 6, 0.95: 1 / 6}
+"""Prior probability of each r of (1): a common error is as likely as none."""
+
+SIZES = np.geomspace(1e-6, 1e6, 241)
+"""K^2 at which (2) is evaluated, over what the values scatter and are uncertain by."""
+
+WALKS = 40
+"""Parts of equal probability in which K^2 is told."""
+
+
+class EarlierBias(NamedTuple):
+    """A bias by an earlier calibration of the device.
+
+    Attributes
+    ----------
+    seconds : when it was recorded
+    value : in the channel's unit
+    variance : of the value
+
+    """
+
+    seconds: float
+    value: float
+    variance: float
+
+
+def walk_from_history(biases: Sequence[EarlierBias]) -> Array:
+    """K^2 in the middle of each of `WALKS` parts of equal probability, (2).
+
+    Parameters
+    ----------
+    biases : three or more, at times that increase
+
+    """
+    t, x, v = np.array(biases).T
+    steps = np.diff(np.eye(len(t)), axis=0) / np.sqrt(np.diff(t))[:, None]
+    eigenvalues, axes = np.linalg.eigh(steps * v @ steps.T)
+    a, squares = np.maximum(eigenvalues, 0.0), (axes.T @ steps @ x) ** 2
+    sizes = SIZES * float(np.mean(squares + a) + 1e-300)
+    own = 1 - np.array(list(SHARES))
+    level = sizes[:, None, None] + own[:, None] * a
+    log_p = -0.5 * (np.log(level) + squares / level).sum(axis=2)
+    log_p += 0.5 * np.log(((sizes[:, None, None] / level) ** 2).sum(axis=2))
+    log_p += np.log(list(SHARES.values()))  # (2)
+    below = np.cumsum(np.exp(log_p - log_p.max()).sum(axis=1))
+    middles = (np.arange(WALKS) + 0.5) / WALKS
+    walks: Array = np.interp(middles, below / below[-1], sizes)
+    return walks

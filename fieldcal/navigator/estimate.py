@@ -19,11 +19,10 @@ axes, device axes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.frames import specific_force_at_home
@@ -31,11 +30,11 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors, thresholds
 from fieldcal.navigator.large_angles import beyond_first_order
 from fieldcal.navigator.mistakes import ATTITUDES, SCATTER, setups_with_mistakes
+from fieldcal.navigator.noise_search import NOISE_LEAST, likeliest_noise
 from fieldcal.navigator.run_rows import (
     RunPosterior,
     RunRows,
     RunSetup,
-    evidence_slopes,
     run_posterior,
     run_rows,
 )
@@ -47,19 +46,11 @@ UNITS = ("m/s^2",) * 3 + ("1",) * 3 + ("rad/s",) * 3
 PRIOR_SIGMAS = 3.0 * np.repeat([priors.BIAS_ACC, priors.SCALE, priors.BIAS_GYR], 3)
 """Prior standard deviations: a few times those of consumer grade."""
 
-SEARCH_TOLERANCE = {"gtol": 0.02}
-"""Tolerance of the search for the noise of (2): slope of log evidence by ln of each."""
-
 PASSES = 2
 """Number of times the rows are linearised about the estimate."""
 
 SLOPE_STEPS = np.repeat([1e-7, 1e-4, 1e-4], 3)
 """Steps of rate, force and angle for numerical derivatives."""
-
-NOISE_LEAST = (1e-6, 1e-8, 1e-6, 1e-6, 1e-6)
-NOISE_MOST = (0.1, 1e-2, 10.0, 10.0, 0.3)
-"""Bounds of N_a (m/s^2/sqrt(Hz)), N_g (rad/s/sqrt(Hz)), q_v (m/s), q_p (m) and J
-(m/s^2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +188,7 @@ def _fit_setup(
     )
     rows, noise = linear, near
     for _ in range(PASSES):
-        noise = _likeliest_noise(rows, sizes, noise)
+        noise = likeliest_noise(rows, sizes, noise)
         mean = run_posterior(rows, sizes, noise).mean
         own = [one.attitude_error(noise, mean) for one in rows]
         pairs = zip(linear, runs, strict=True)
@@ -205,49 +196,8 @@ def _fit_setup(
             _linearise_about(one, run, setup, r, mean, own[r])
             for r, (one, run) in enumerate(pairs)
         ]
-    noise = _likeliest_noise(rows, sizes, noise)
+    noise = likeliest_noise(rows, sizes, noise)
     return _SetupFit(setup, rows, noise, run_posterior(rows, sizes, noise))
-
-
-def _likeliest_noise(
-    rows: Sequence[RunRows], sizes: Array, near: Array | None
-) -> Array:
-    """Noise of the greatest evidence, (5,) as in (2); `near` is the start value."""
-    from scipy.optimize import minimize
-
-    acts = _noise_that_acts(rows)
-    least, most = np.log(NOISE_LEAST)[acts], np.log(NOISE_MOST)[acts]
-
-    def with_noise(logs: Array) -> Array:
-        out = np.array(NOISE_LEAST)
-        out[acts] = np.exp(logs)
-        return out
-
-    def worse(logs: Array) -> tuple[float, Array]:
-        noise = with_noise(logs)
-        found = run_posterior(rows, sizes, noise)
-        return -found.score, -evidence_slopes(rows, found, noise)[acts]
-
-    def score(logs: Array) -> float:
-        return run_posterior(rows, sizes, with_noise(logs)).score
-
-    start = _coarse_maximum(score, least, most) if near is None else np.log(near[acts])
-    bounds = list(zip(least, most, strict=True))
-    found = minimize(
-        worse,
-        start,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=bounds,
-        options=SEARCH_TOLERANCE,
-    )
-    return with_noise(found.x)
-
-
-def _noise_that_acts(rows: Sequence[RunRows]) -> NDArray[np.bool_]:
-    """Which noise of (2) the rows depend on, (5,): q only of what was recorded."""
-    of_position = np.concatenate([one.is_position for one in rows])
-    return np.array([True, True, not of_position.all(), of_position.any(), True])
 
 
 def _linearise_about(
@@ -276,15 +226,6 @@ def _linearise_about(
     return replace(
         one, y=y, design=one.design + more, attitude_design=one.attitude_design + by_phi
     )
-
-
-def _coarse_maximum(
-    score: Callable[[Array], float], least: Array, most: Array
-) -> Array:
-    """Point of a coarse grid of the logarithms with the greatest score."""
-    parts = [np.linspace(a, b, 5)[1:-1] for a, b in zip(least, most, strict=True)]
-    points = np.stack(np.meshgrid(*parts), axis=-1).reshape(-1, len(least))
-    return np.asarray(points[int(np.argmax([score(p) for p in points]))])
 
 
 def _determined_parameters(best: _SetupFit, off: tuple[str, ...]) -> DriftEstimate:

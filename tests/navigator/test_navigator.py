@@ -140,6 +140,7 @@ def test_noise_is_found_in_the_drift(usual: tuple[Calibration, Sensors]) -> None
     told = found.info["navigator"]
     assert 0.5 < told["force_noise_m_s2_rthz"] / sensors.force_noise < 2
     assert 0.5 < told["rate_noise_rad_s_rthz"] / sensors.rate_noise < 2
+    assert 0.5 < told["velocity_noise_m_s"] / 1e-3 < 2
     assert told["runs"] == 6 and not told["missing"]
 
 

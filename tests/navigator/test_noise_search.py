@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fieldcal.navigator.estimate import NOISE_LEAST, NOISE_MOST
+from fieldcal.navigator.noise_search import NOISE_LEAST, NOISE_MOST, likeliest_noise
 from fieldcal.navigator.run_rows import (
     RunRows,
     RunSetup,
@@ -75,3 +75,16 @@ def test_any_noise_within_its_bounds_has_an_evidence(which: int) -> None:
     rows = rows_of(0.01)
     found = run_posterior(rows, SIZES, noise)
     assert np.isfinite([found.score, *evidence_slopes(rows, found, noise)]).all()
+
+
+@pytest.mark.parametrize("start", [None, NOISE_LEAST, NOISE_MOST])
+def test_the_noise_is_that_of_the_outputs_from_any_start(
+    start: tuple[float, ...] | None,
+) -> None:
+    """Far below it the evidence is flat, as at its maximum."""
+    found = likeliest_noise(
+        rows_of(0.01), SIZES, None if start is None else np.array(start)
+    )
+    np.testing.assert_allclose(found[2:4], 0.01, rtol=0.2)
+    again = likeliest_noise(rows_of(0.01), SIZES, found)
+    np.testing.assert_allclose(np.log(again / found), 0.0, atol=0.05)

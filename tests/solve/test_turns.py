@@ -286,7 +286,7 @@ def test_a_turn_with_samples_missing_is_left_out(tmp_path: Path) -> None:
     for a, b in windows:
         inside |= (block.t >= a) & (block.t <= b)
     bare = Block.of(block.t[inside], block.acc[inside], block.gyr[inside])
-    with pytest.raises(NotObservable, match="record on"):
+    with pytest.raises(NotObservable, match="record the turns"):
         calibrated(tmp_path / "bare", bare, windows, turns="yes")
 
 

@@ -93,7 +93,7 @@ _PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({_NUMBER})(?:\|\w*)?")
 _LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*")
 """What programs write behind the time of a line."""
 
-_ARRIVAL = re.compile(
+ARRIVAL = re.compile(
     r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*|"
     r"\d{4}-\d\d-\d\d[-_T ]\d\d-\d\d-\d\d(?:\.\d+)?)\]?\s*(?:->|>|:+|,|\s)\s*"
 )
@@ -135,7 +135,7 @@ def labelled_values(line: str) -> list[Labelled]:
     line = _LISTED.sub(r"\1: \2", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
     line = _of_temperature(line)
-    arrival, ticks = _ARRIVAL.match(line), _TICKS.match(line)
+    arrival, ticks = ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
     rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest

@@ -75,7 +75,7 @@ _BARE_STEPS = (("delta",), ("interval",))
 _TEMPERATURES = ("temp", "temperature", "tmp", "temper", "temperatur", "temperatura",
                  "温度")  # fmt: skip
 _WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world",
-                    "earth")  # fmt: skip
+                    "earth", "rotated")  # fmt: skip
 """Words of accelerations that may lack gravity, or lie in axes of the Earth."""
 
 SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "noise")

@@ -85,3 +85,43 @@ def test_small_temperatures_beside_800_counts_in_a_g_may_be_counts(
     assert "--temp-unit count --temp-lsb 13.5391 --temp-zero 31 (31.3 to" in said
     assert "--temp-unit degC, if it is so" in said
     assert main([*call, "--temp-unit", "degC"]) == 0
+
+
+def test_rows_without_a_value_may_have_another_clock(tmp_path: Path) -> None:
+    """A device writes what its filter computes in rows between, a little late."""
+    lines = [
+        "state,time,accX,accY,accZ,gyroX,gyroY,gyroZ,estAccelX,estAccelY,estAccelZ"
+    ]
+    for t, a, w in zip(T.tolist(), A.tolist(), W.tolist(), strict=True):
+        six = ",".join(f"{x:.8g}" for x in (*a, *w))
+        three = ",".join(f"{x:.8g}" for x in a)
+        lines += [f"S,{t + 1:.4f},{six},,,", f"S,{t + 0.9995:.4f},,,,,,,{three}"]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(lines) + "\n")
+    assert_same(imported(path))
+
+
+def test_forces_that_were_turned_are_not_those_of_another_imu(tmp_path: Path) -> None:
+    names = [
+        *(f"raw_acceleration_{x}_gs" for x in "xyz"),
+        *(f"raw_rotated_acceleration_{x}_gs" for x in "xyz"),
+        *(f"raw_angular_rate_{x}_deg_per_s" for x in "xyz"),
+    ]
+    level = np.tile([0.0, 0.01, 1.0], (len(T), 1))
+    rows = np.column_stack([T, A / G, level, DEG])
+    heading = ",".join(["timestamp_seconds", *names])
+    assert_same(imported(write(tmp_path, rows, heading=heading)))
+
+
+@pytest.mark.parametrize(("per_ms2", "asked"), [(100.0, True), (1000 / G, False)])
+def test_what_reads_as_cm_or_mg_is_asked_about(
+    tmp_path: Path, per_ms2: float, asked: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They are 2 % apart, which nothing else would show."""
+    length = np.linalg.norm(A, axis=1, keepdims=True)
+    rows = np.column_stack([T, np.round(G * A / length * per_ms2, 1), W])
+    path = write(tmp_path, rows, heading="t,ax,ay,az,gx,gy,gz")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2 * asked
+    said = capsys.readouterr().err
+    expected = "add --acc-unit cm/s^2 or --acc-unit mg" if asked else "taken as mg"
+    assert expected in said

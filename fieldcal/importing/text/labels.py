@@ -90,7 +90,10 @@ _TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
 _PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({_NUMBER})(?:\|\w*)?")
 """A name, ms since 1970 and a value, as Teleplot reads them."""
 
-_LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*")
+LEVEL = re.compile(
+    r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*"
+    r"|\s*[\[(](?i:debug|info|warning|warn|error|trace)[\])][\s:,-]*"
+)
 """What programs write behind the time of a line."""
 
 ARRIVAL = re.compile(
@@ -138,7 +141,7 @@ def labelled_values(line: str) -> list[Labelled]:
     arrival, ticks = ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
-    rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest
+    rest = LEVEL.sub("", rest, 1) if LEVEL.match(rest) else rest
     split = _split_labels(rest)
     parts, values = [], []
     for label, text in split:

@@ -14,7 +14,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple, Self
 
-from fieldcal.importing.text.labels import ARRIVAL, LONGEST, labelled_values
+from fieldcal.importing.text.labels import ARRIVAL, LEVEL, LONGEST, labelled_values
 from fieldcal.importing.text.log_prefixes import log_prefix
 from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
 from fieldcal.importing.words.heading_words import heading_meaning
@@ -86,6 +86,7 @@ class NestedValues(TextForm):
             if not self._labelled:
                 numbers = ",".join(value.text for value in values)
                 log = log_prefix(line)
+                before = LEVEL.sub("", before)
                 return f"{log.value},{numbers}" if log else f"{before}{numbers}"
             return before + ", ".join(
                 f"{v.name} [{v.unit}]: {v.text}" if v.unit else f"{v.name}: {v.text}"
@@ -105,7 +106,9 @@ def _tell(names: Sequence[str]) -> bool:
 def _begin(line: str) -> int:
     """Where what a program's log or a monitor writes before a line ends."""
     prefix, arrival = log_prefix(line), ARRIVAL.match(line)
-    return prefix.length if prefix else arrival.end() if arrival else 0
+    begin = prefix.length if prefix else arrival.end() if arrival else 0
+    level = LEVEL.match(line, begin)
+    return level.end() if level else begin
 
 
 def _values(line: str) -> list[NestedValue]:

@@ -329,7 +329,9 @@ class TextColumns(ColumnRecording):
     def _in_turn(self) -> ImuInstances | None:
         """What tells several IMUs apart whose rows come in turn."""
         first = next((top_lines(d) for d in self._text.pieces(self._forms)), [])
-        return find_instances(first, self.wanted.separator)
+        found = find_instances(first, self.wanted.separator)
+        self.says += found.says if found is not None else []
+        return found
 
     @cached_property
     def _forms(self) -> list[TextForm]:

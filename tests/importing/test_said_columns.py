@@ -125,3 +125,31 @@ def test_what_reads_as_cm_or_mg_is_asked_about(
     said = capsys.readouterr().err
     expected = "add --acc-unit cm/s^2 or --acc-unit mg" if asked else "taken as mg"
     assert expected in said
+
+
+def test_flags_beside_the_axes_are_no_imu(tmp_path: Path) -> None:
+    """Axes come in any order, each with a column that says whether it is valid."""
+    names, columns = ["Time"], [T]
+    for kind, three in (("Accel", A / G), ("Gyro", W)):
+        for i in (2, 0, 1):
+            name = f"node-1.2:scaled{kind}{'XYZ'[i]}"
+            names += [name, f"{name}:valid"]
+            columns += [three[:, i], np.ones(len(T))]
+    path = write(tmp_path, np.column_stack(columns), heading=",".join(names))
+    assert_same(imported(path))
+
+
+def test_an_imu_that_is_not_there_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = []
+    for a, w in zip(A.tolist(), W.tolist(), strict=True):
+        lines += ["IMU,0x69," + ",".join(["0.000"] * 6)]
+        lines += ["IMU,0x68," + ",".join(f"{x:.8g}" for x in (*a, *w))]
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(lines) + "\n")
+    rate = f"{1 / float(np.diff(T).mean()):.6g}"
+    out = tmp_path / "out"
+    assert main(["import", str(path), "-o", str(out), "--rate", rate]) == 0
+    assert "0x69 holds only zeros: it is left out" in capsys.readouterr().err
+    np.testing.assert_allclose(Session.open(out).block.acc, A, atol=1e-5)

@@ -129,6 +129,19 @@ def test_values_that_stay_over_rows_tell_how_fast_the_sensor_is(
     assert "values of its gyroscopes" not in said
 
 
+def test_values_may_stay_over_now_more_now_fewer_rows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A program takes what a slow gyroscope has sent last."""
+    stays = np.random.default_rng(5).integers(4, 9, len(T))
+    rows = np.column_stack([T, A, W])
+    rows[:, 4:] = np.repeat(rows[:, 4:], stays, axis=0)[: len(T)]
+    imported(write(tmp_path, rows, heading="t,ax,ay,az,gx,gy,gz"))
+    said = capsys.readouterr().err
+    assert "its gyroscopes stay over about 6 rows each" in said
+    assert "values of its accelerometers" not in said
+
+
 def test_coarse_counts_of_a_device_at_rest_tell_no_rate(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

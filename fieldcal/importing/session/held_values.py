@@ -13,8 +13,8 @@ MIN_RUNS = 50
 """Values that tell how long each stays."""
 
 USUAL = 0.8
-"""Share of the values that stay about as long as the usual one: coarse counts of a
-device at rest stay for any time, and change with each row while it turns."""
+"""Share of the values that stay more than half as long as the usual one: coarse counts
+of a device at rest stay for any time, and change with each row while it turns."""
 
 
 class HeldValues:
@@ -50,8 +50,8 @@ class HeldValues:
             number = sum(runs.values())
             if number < MIN_RUNS:
                 continue
-            usual = int(np.median([*runs.elements()]))
-            near = sum(runs[n] for n in (usual - 1, usual, usual + 1)) / number
+            usual = float(np.median([*runs.elements()]))
+            near = sum(many for n, many in runs.items() if n > usual / 2) / number
             if usual > 1 and near >= USUAL:
                 mean = sum(n * many for n, many in runs.items()) / number
                 found[sensor] = rate / mean

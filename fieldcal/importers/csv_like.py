@@ -117,7 +117,9 @@ class TextColumns(ColumnRecording):
         sensor = self.sensor or sensor_of_file_name(self.path.name.split(".")[0])
         if not sensor:
             return found
+        told_by = "the names of its columns and of the file"
         if not found and (names := self._three_axes()):
+            told_by = "the name of the file"
             found = [Heading([Column("", name) for name in names], SKIP)]
         ways = [
             Heading([of_sensor(sensor, c) for c in way.columns], way.skip)
@@ -126,6 +128,7 @@ class TextColumns(ColumnRecording):
         if not self.sensor and ways != found:
             of_it = f"its axes are those of the {SENSOR[sensor]}, as the file is called"
             self.says += [of_it] if of_it not in self.says else []
+            self.told_by = told_by
         return ways
 
     def _three_axes(self) -> tuple[str, ...]:
@@ -220,6 +223,13 @@ class TextColumns(ColumnRecording):
     def ask(self) -> str:
         """Say how its columns are named."""
         lines = self._top or [""]
+        if not self._numbers.size:
+            return (
+                f"{self.path}: no line of it is a row of numbers, and none has values"
+                f" with labels that are known; its first line is {lines[0][:60]!r}:"
+                " write a row for each sample, such as t,ax,ay,az,gx,gy,gz with commas"
+                " between"
+            )
         return (
             f"{self.path}: say what its columns are, such as --columns"
             f" {columns.column_placeholders(self._numbers.shape[1])}; its first line is"
@@ -319,7 +329,9 @@ class TextColumns(ColumnRecording):
     def _in_turn(self) -> ImuInstances | None:
         """What tells several IMUs apart whose rows come in turn."""
         first = next((top_lines(d) for d in self._text.pieces(self._forms)), [])
-        return find_instances(first, self.wanted.separator)
+        found = find_instances(first, self.wanted.separator)
+        self.says += found.says if found is not None else []
+        return found
 
     @cached_property
     def _forms(self) -> list[TextForm]:

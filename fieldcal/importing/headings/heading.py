@@ -10,6 +10,9 @@ from typing import NamedTuple
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.words.heading_units import TEMPERATURES
 
+NAMES = "the names of its columns"
+"""What says what its columns are, in most files."""
+
 
 class Column(NamedTuple):
     """A column of a file.
@@ -91,13 +94,16 @@ class HeadingMatch:
             reversed=wanted.reversed | self.reversed,
         )
 
-    def sentence(self, wanted: ReadOptions, rate_said: bool = False) -> str:
+    def sentence(
+        self, wanted: ReadOptions, rate_said: bool = False, told_by: str = NAMES
+    ) -> str:
         """Say what is taken from the names, as options that do the same.
 
         Parameters
         ----------
         wanted : the options that are taken
         rate_said : whether the file says its rate, which no option has to say again
+        told_by : what says the sensor
 
         """
         text = f"--columns {quote(','.join(with_signs(self.columns, self.reversed)))}"
@@ -110,4 +116,4 @@ class HeadingMatch:
         }.items():
             if kind in self.units and (unit := given or self.units[kind]):
                 text += f" {option} {quote(unit)}"
-        return f"taken from the names of its columns: {text}"
+        return f"taken from {told_by}: {text}"

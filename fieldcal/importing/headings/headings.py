@@ -30,7 +30,7 @@ from fieldcal.importing.words.thermometer_words import BESIDE_THERMOMETERS, FORE
 
 NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
                "magnitude", "norm", "drift", "delta",
-               "covariance")  # fmt: skip
+               "covariance", "valid", "validity", "flag", "status")  # fmt: skip
 """Words of columns that are no samples of a sensor."""
 
 G_FORCE = (("g",), ("g", "force"))

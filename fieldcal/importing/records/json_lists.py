@@ -57,13 +57,20 @@ def json_lists(
         yield name or "list", floats(document)
     elif all(isinstance(one, list) for one in document):
         if len({len(one) for one in document}) == 1 and document[0]:
-            rows = [floats(one) for one in document if all(map(is_number, one))]
-            if len(rows) == len(document):
+            rows = [floats(one) for one in map(_flat, document)
+                    if all(map(is_number, one))]  # fmt: skip
+            if len(rows) == len(document) and len({*map(len, rows)}) == 1:
                 yield name or "list", np.array(rows)
     else:
         records = [read_record(one) for one in document if isinstance(one, Mapping)]
         for bare, values in _fields(records, [] if says is None else says):
             yield (f"{name}/{bare}" if name else bare), values
+
+
+def _flat(row: Sequence[Any]) -> list[Any]:
+    """A row without the lists within it: ``[t, [ax, ay, az], [gx, gy, gz]]``."""
+    inner = [one if isinstance(one, list) else [one] for one in row]
+    return [value for one in inner for value in one]
 
 
 def _fields(

@@ -18,6 +18,7 @@ from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.session.found_rests import find_rests
+from fieldcal.importing.session.held_values import HeldValues
 from fieldcal.importing.session.sample_writer import SampleWriter, file_record
 from fieldcal.importing.session.stream_facts import StreamFacts
 from fieldcal.importing.times.row_validator import RowValidator
@@ -142,6 +143,7 @@ def _write_session(
     import tomlkit
 
     judge = RowValidator(str(recording.path), recording.place, recording.repair)
+    held = HeldValues()
     facts, cells, clock, jumps = (
         StreamFacts(),
         CellAccumulator(),
@@ -153,6 +155,7 @@ def _write_session(
         for good in judge.through(blocks):
             if len(good):
                 facts.add(good)
+                held.add(good)
                 cells.add(without_spikes(good))
                 if recording.wanted.rate_hz:
                     jumps.add(good)
@@ -168,6 +171,8 @@ def _write_session(
     text = tomlkit.dumps({**about, **tables})
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
     recording.says += judge.says
+    if "position" not in about:
+        recording.says += held.says(facts.rate_hz)
     recording.says += [said for said in (found.how, found.left_out) if said]
     recording.says += [step.sentence() for step in clock.steps]
     repairs = [*recording.mended, *judge.mended]

@@ -22,6 +22,7 @@ from fieldcal.importing.tables.column_times import (
     ask_rate_of_shared_times,
     batch_options,
     constant_value,
+    grows_each_row,
     is_clock_number,
     is_row_counter,
     rate_hint,
@@ -97,7 +98,8 @@ class ColumnClock:
             If its times do not say when a row was taken.
 
         """
-        wanted = self._clocked(self._wanted) if self._own else self._wanted
+        wanted = self._wanted
+        wanted = self._clocked(wanted) if self._own else self._without_sums(wanted)
         return self._signed(self._rated(wanted))
 
     def _clocked(self, wanted: ReadOptions) -> ReadOptions:
@@ -120,6 +122,32 @@ class ColumnClock:
             "its clock has whole seconds and what is beyond them apart"
         )
         return replace(wanted, columns=tuple(named), time_unit="s")
+
+    def _without_sums(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with the time where what the user calls its steps only grows.
+
+        Raises
+        ------
+        InputError
+            If it counts rows.
+
+        """
+        table, at = self._of.beginning(), column_numbers(self._of, wanted)
+        i = at.get("dt", -1)
+        if not 0 <= i < table.shape[1] or not grows_each_row(table[:, i]):
+            return wanted
+        named = tuple(
+            f"t{c[len('dt') :]}" if c.partition("=")[0] == "dt" else c
+            for c in wanted.columns
+        )
+        wanted = replace(wanted, columns=named)
+        if is_row_counter(table[:, i]) and not wanted.time_unit:
+            raise InputError(f"{self._of.path}: {ask_rate_of_counter(wanted, table)}")
+        self._of.says.append(
+            "column dt grows from row to row: it is taken for t, the time, and not for"
+            " the time since the row before"
+        )
+        return wanted
 
     def _rated(self, wanted: ReadOptions) -> ReadOptions:
         """Options with the rate that the file says, or with the unit of its times."""

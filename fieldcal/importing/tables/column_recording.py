@@ -14,7 +14,17 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.headings import headings
-from fieldcal.importing.headings.heading import Heading, HeadingMatch, with_signs
+from fieldcal.importing.headings.column_units import (
+    unit_options,
+    units_over,
+    with_units,
+)
+from fieldcal.importing.headings.heading import (
+    NAMES,
+    Heading,
+    HeadingMatch,
+    with_signs,
+)
 from fieldcal.importing.recording import (
     ImuStream,
     MeanScatter,
@@ -40,6 +50,9 @@ class ColumnRecording(Recording):
 
     in_turn = False
     """Whether its rows hold the accelerometer or the gyroscope, as far as is known."""
+
+    told_by = NAMES
+    """What says the sensor of its columns."""
 
     @abstractmethod
     def heading(self) -> list[Heading]:
@@ -121,7 +134,7 @@ class ColumnRecording(Recording):
 
     def _found(self) -> dict[str, ReadOptions]:
         if self.wanted.columns:
-            return {"0": self.wanted}
+            return {"0": self._with_units_of_names()}
         table = self.beginning()
         headed = self.heading()
         checked = [
@@ -147,10 +160,24 @@ class ColumnRecording(Recording):
         taken = {one.name: one.taken(self.wanted) for one in named}
         rate = self.rate_said()
         for one in named:
-            sentence = one.sentence(taken[one.name], rate is not None)
+            sentence = one.sentence(taken[one.name], rate is not None, self.told_by)
             alone = [sentence] if len(named) == 1 else []
             self.says += [s for s in (*alone, *one.says) if s not in self.says]
         return taken
+
+    def _with_units_of_names(self) -> ReadOptions:
+        """What the user says, with the units that stand over the columns so named."""
+        wanted, at = self.wanted, column_numbers(self, self.wanted)
+        width = self.beginning().shape[1]
+        for way in self.heading():
+            if len(way.columns) == width:
+                units = units_over(way.columns, at)
+                with_them = with_units(wanted, units)
+                if with_them != wanted:
+                    options = " ".join(unit_options(wanted, with_them))
+                    self.says.append(f"taken from {NAMES}: {options}")
+                    return with_them
+        return wanted
 
     def _told(
         self, named: Sequence[HeadingMatch], way: Heading | None

@@ -225,6 +225,12 @@ def keeps_growing(t: Array) -> bool:
     return not back and bool((steps > 0).any())
 
 
+def grows_each_row(column: Array) -> bool:
+    """Whether numbers (n,) keep growing, and not by a late change of the rate."""
+    steps = np.diff(column[np.isfinite(column)])
+    return keeps_growing(column) and bool((steps > 0).mean() > 0.5)
+
+
 def rates_by_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
     """Rates, Hz, at which turns by gyroscopes agree with those by gravity, by unit."""
     at = {c.partition("=")[0]: i for i, c in enumerate(wanted.columns)}

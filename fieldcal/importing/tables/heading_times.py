@@ -9,6 +9,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.tables.column_times import (
+    grows_each_row,
     is_row_counter,
     keeps_growing,
     split_seconds,
@@ -70,17 +71,11 @@ def _without_sums(way: Heading, table: Array) -> Heading:
         return way
     names = [*way.columns]
     for i, one in enumerate(said):
-        if one is not None and one.kind == "dt" and _grows_each_row(table[:, i]):
+        if one is not None and one.kind == "dt" and grows_each_row(table[:, i]):
             counts = one.unit is None and is_row_counter(table[:, i])
             name = "" if counts else "time"
             names[i] = names[i]._replace(name=name, unit=one.unit or "")
     return Heading(names, way.skip)
-
-
-def _grows_each_row(column: Array) -> bool:
-    """Whether numbers (n,) keep growing, and not by a late change of the rate."""
-    steps = np.diff(column[np.isfinite(column)])
-    return keeps_growing(column) and bool((steps > 0).mean() > 0.5)
 
 
 def _with_thermometer(way: Heading, table: Array) -> Heading:

@@ -18,6 +18,9 @@ NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "a
          "unit", "idx", "dev", "mac", "module", "devicename", "设备名称"}  # fmt: skip
 """Names of columns that tell devices apart, without "id" at their end."""
 
+AXES = 3
+"""Columns behind the name of an IMU: of its axes; one of them may be a time."""
+
 MAX_INSTANCES = 16
 """IMUs of one log."""
 
@@ -39,12 +42,19 @@ class ImuInstances(NamedTuple):
     column : its number
     separator : of columns
     names : cells of that column, in the order in which they come
+    silent : cells of those whose rows hold only zeros, which are left out
 
     """
 
     column: int
     separator: str | None
     names: tuple[str, ...]
+    silent: tuple[str, ...] = ()
+
+    @property
+    def says(self) -> list[str]:
+        """What the user must know, a sentence each."""
+        return [f"{name} holds only zeros: it is left out" for name in self.silent]
 
     def only(self, name: str, lines: Sequence[str]) -> list[str]:
         """Lines of one IMU, and those that are none of any."""
@@ -53,7 +63,7 @@ class ImuInstances(NamedTuple):
     def _cell(self, line: str) -> str | None:
         row = line.split(self.separator)
         cell = row[self.column].strip().strip('"') if len(row) > self.column else ""
-        return cell if cell in self.names else None
+        return cell if cell in (*self.names, *self.silent) else None
 
 
 def find_instances(lines: Sequence[str], separator: str | None) -> ImuInstances | None:
@@ -74,7 +84,11 @@ def find_instances(lines: Sequence[str], separator: str | None) -> ImuInstances 
         named = any(tells_devices(row[i]) for row in above)
         words = not any(is_number(cell, False) for cell in column)
         if (named or words) and _in_turn(column):
-            return ImuInstances(i, parted, tuple(dict.fromkeys(column)))
+            names = dict.fromkeys(column)
+            zeros = [name for name in names if _is_silent(numbers, i, name)]
+            silent = zeros if len(zeros) < len(names) else []
+            live = tuple(name for name in names if name not in silent)
+            return ImuInstances(i, parted, live, tuple(silent))
     return None
 
 
@@ -82,6 +96,14 @@ def tells_devices(name: str) -> bool:
     """Whether a name is that of a column or field that identifies devices."""
     bare = re.sub(r"[\s_.-]+", "", name.lower().lstrip("#%/ "))
     return bare in NAMES or (bare.endswith("id") and bare[:-2] in NAMES)
+
+
+def _is_silent(rows: Sequence[Sequence[str]], i: int, name: str) -> bool:
+    """Whether the axes of an IMU hold only zeros, as those of one that is not there."""
+    own = [row[i + 1 :] for row in rows if row[i] == name]
+    zeros = [all(is_number(cell, False) and float(cell) == 0 for cell in cells)
+             for cells in zip(*own, strict=True)]  # fmt: skip
+    return len(zeros) >= AXES and sum(zeros) >= len(zeros) - 1
 
 
 def _in_turn(column: Sequence[str]) -> bool:

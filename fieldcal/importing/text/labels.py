@@ -90,10 +90,13 @@ _TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
 _PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({_NUMBER})(?:\|\w*)?")
 """A name, ms since 1970 and a value, as Teleplot reads them."""
 
-_LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*")
+LEVEL = re.compile(
+    r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*"
+    r"|\s*[\[(](?i:debug|info|warning|warn|error|trace)[\])][\s:,-]*"
+)
 """What programs write behind the time of a line."""
 
-_ARRIVAL = re.compile(
+ARRIVAL = re.compile(
     r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*|"
     r"\d{4}-\d\d-\d\d[-_T ]\d\d-\d\d-\d\d(?:\.\d+)?)\]?\s*(?:->|>|:+|,|\s)\s*"
 )
@@ -135,10 +138,10 @@ def labelled_values(line: str) -> list[Labelled]:
     line = _LISTED.sub(r"\1: \2", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
     line = _of_temperature(line)
-    arrival, ticks = _ARRIVAL.match(line), _TICKS.match(line)
+    arrival, ticks = ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
-    rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest
+    rest = LEVEL.sub("", rest, 1) if LEVEL.match(rest) else rest
     split = _split_labels(rest)
     parts, values = [], []
     for label, text in split:

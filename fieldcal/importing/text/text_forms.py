@@ -2,6 +2,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
 
     "0,12","0,34"                      quoted, also with decimal commas
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
+    Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
     $IMU,0.01,0.1*5A                   lines with a checksum
     %RAWIMUSA,2209,4916.2;...*1fb76c28  messages of a receiver
@@ -9,6 +10,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     0.01,0.1,0.2,9.8;                  lines with a mark at their end
     angular_velocity:\n  x: 0.1        messages as ROS shows them
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
+    12,345,0.1,0.2                     decimal commas between commas, by the names
     FF3A 0012                          counts in hexadecimal digits
     gscale,0.0005                      counts below lines that say what one of them is
     2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
@@ -40,9 +42,11 @@ from fieldcal.importing.text.labels import (
 from fieldcal.importing.text.labview_text import LabviewText
 from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
+from fieldcal.importing.text.nested_values import NestedValues
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.importing.text.scaled_counts import ScaledCounts
+from fieldcal.importing.text.split_decimals import SplitDecimals
 from fieldcal.importing.text.tagged_lines import TaggedLines
 from fieldcal.importing.text.text_form import (
     MOSTLY,
@@ -293,7 +297,7 @@ FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, QuotedCells,
     FortranNumbers, UnitCells,
-    LongTable, LabelledValues, BarTable, ListCells,
-    TaggedLines, ArrivalPrefix, HexCells, BareFractions, ClockColumn,
+    LongTable, NestedValues, LabelledValues, BarTable, ListCells,
+    SplitDecimals, TaggedLines, ArrivalPrefix, HexCells, BareFractions, ClockColumn,
 )  # fmt: skip
 """Forms in the order in which they are looked for."""

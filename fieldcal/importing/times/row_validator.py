@@ -130,10 +130,12 @@ class RowValidator:
             self._note(column, what, self._seen + np.flatnonzero(rows & ~bad))
             bad |= rows
         self._leave_out(int(bad.sum()))
-        kept = np.flatnonzero(~bad)
+        # of what has no value, the time does not matter: it may be another clock's
+        usable = ~(bad | _without_numbers(block))
+        kept = np.flatnonzero(usable)
         if len(kept):
             numbers = np.append(self._held_row, self._seen + kept)
-            whole = block if len(kept) == len(block) else _rows_of(block, ~bad)
+            whole = block if len(kept) == len(block) else _rows_of(block, usable)
             if len(self._held):
                 whole = concat([self._held, whole])
             else:
@@ -221,7 +223,7 @@ class RowValidator:
         before, self._before = self._before, float(t[-1]) if len(t) else self._before
         if len(t) and self._newest < t[0] and (steps > 0).all():
             self._newest = float(t[-1])
-            return _rows_of(block, ~_without_numbers(block))
+            return block
         # one time that leaps ahead is wrong itself, not all that come after it
         behind = np.append(t, following)[1:]
         ahead = (t > behind) & (behind > np.append(before, t)[:-1])
@@ -237,7 +239,7 @@ class RowValidator:
             )
             self._note("t", what, numbers[run])
         self._leave_out(int((late | ahead).sum()))
-        return _rows_of(block, ~(late | ahead | _without_numbers(block)))
+        return _rows_of(block, ~(late | ahead))
 
     def _note(self, column: str, what: str, rows: Index) -> None:
         """Note a fault of some rows, by their numbers in the file, ascending."""

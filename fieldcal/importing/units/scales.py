@@ -49,6 +49,9 @@ def _counts_per_unit(per_unit: float, bits: int = 16) -> float:
     return 2.0 ** (bits - 1) / per_unit
 
 
+CENTI = "cm/s^2"
+"""Unit in which a few sensors count; gravity is 2 % less in it than in mg."""
+
 ANALOG = ((800.0, 10.0), (800.0 * 2**16, 10.0 * 2**16))
 """Counts in a g, and in a deg/s beside them, of sensors of Analog Devices in 16 and 32
 bits."""
@@ -96,6 +99,7 @@ ACC_SCALES = (
     *(Scale(c, "g", c) for c in _G_COUNTS),
     Scale(1e6, "ug"),
     Scale(1000 * G0, "mm/s^2"),
+    Scale(100 * G0, CENTI),
 )
 
 GYR_SCALES = (
@@ -144,4 +148,6 @@ def fitting_scales(
 
     """
     away = {s: abs(float(np.log(size / s.size))) for s in scales}
-    return sorted((s for s in scales if away[s] <= within), key=away.__getitem__)
+    fits = sorted((s for s in scales if away[s] <= within), key=away.__getitem__)
+    # what reads as mg is mg: only what is nearer to the other unit may be either
+    return [s for s in fits if s.unit != CENTI or s is fits[0]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -42,7 +42,17 @@ _THERMOMETERS = ((256.0, 25.0), (340.0, 36.53), (333.87, 21.0))
 """Counts in 1 K, and deg C at count 0, of the usual sensors."""
 
 
-def temperature_counts(low: float, high: float) -> list[str]:
+ANALOG_THERMOMETERS = ((10.0, 0.0), (1 / 0.00565, 25.0), (1 / 0.07386, 31.0),
+                       (1 / 0.14, 25.0))  # fmt: skip
+"""Likewise of the sensors of Analog Devices: ADIS1647x and 1650x, 1648x and 1649x,
+16448, and 1640x."""
+
+
+def temperature_counts(
+    low: float,
+    high: float,
+    thermometers: Sequence[tuple[float, float]] = _THERMOMETERS,
+) -> list[str]:
     """Options that make deg C of counts from `low` to `high`, as the usual sensors do.
 
     >>> temperature_counts(65236, 65240)[0]
@@ -50,11 +60,11 @@ def temperature_counts(low: float, high: float) -> list[str]:
     """
     wrapped = 2**16 if low >= 2**15 else 0
     found = []
-    for lsb, zero in _THERMOMETERS:
+    for lsb, zero in thermometers:
         coldest, warmest = (zero + (n - wrapped) / lsb for n in (low, high))
         if -45 <= coldest and warmest <= 105:
             found.append(
-                f"--temp-unit count --temp-lsb {lsb:g} --temp-zero"
+                f"--temp-unit count --temp-lsb {lsb:.6g} --temp-zero"
                 f" {zero - wrapped / lsb:.6g} ({coldest:.1f} to {warmest:.1f} deg C)"
             )
     return found or [

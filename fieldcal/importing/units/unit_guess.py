@@ -29,6 +29,7 @@ from fieldcal.importing.units.rate_size import compare_turns, estimate_rate_unit
 from fieldcal.importing.units.scales import (
     ACC_OUT,
     ACC_SCALES,
+    ANALOG,
     GYR_OUT,
     GYR_SCALES,
     MIN_ROWS_ALONE,
@@ -37,6 +38,7 @@ from fieldcal.importing.units.scales import (
     rounded_text,
 )
 from fieldcal.importing.units.thermometers import (
+    ANALOG_THERMOMETERS,
     is_usual_temperature,
     temperature_counts,
     temperature_fits,
@@ -303,14 +305,26 @@ class _Guess:
 
     def _temperature(self, values: Array) -> None:
         fits = temperature_fits(values)
-        if "degC" in fits:
+        known = values[np.isfinite(values)]
+        whole = bool(len(known) and (known == np.round(known)).all())
+        analog = whole and self.said.acc_lsb in {acc for acc, _ in ANALOG}
+        if "degC" in fits and not analog:
             return
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        known = values[np.isfinite(values)]
+        if analog:
+            self._ask(
+                f"its temperature reads {low:.6g} to {high:.6g} beside counts of"
+                " which Analog Devices have so many in a g, so it may be counts too",
+                [
+                    *temperature_counts(low, high, ANALOG_THERMOMETERS),
+                    *(["--temp-unit degC, if it is so"] if "degC" in fits else []),
+                    "--temp-unit none, which leaves it out",
+                ],
+            )
         # who writes one sensor's registers as they are, may write the other's so too
         scaled = self.said.acc_lsb == self.said.gyr_lsb == 1
         scaled &= self.said.acc_unit not in UNSCALED
-        raw = not scaled and bool((known == np.round(known)).all())
+        raw = not scaled and whole
         if len(fits) != 1 or raw or not is_usual_temperature(*fits.values()):
             self._ask(
                 f"its temperature reads {low:.6g} to {high:.6g}, which is no deg C",

@@ -75,8 +75,9 @@ _BARE_STEPS = (("delta",), ("interval",))
 _TEMPERATURES = ("temp", "temperature", "tmp", "temper", "temperatur", "temperatura",
                  "温度")  # fmt: skip
 _WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world",
-                    "earth")  # fmt: skip
-"""Words of accelerations that may lack gravity, or lie in axes of the Earth."""
+                    "earth", "rotated", "est", "estimated")  # fmt: skip
+"""Words of accelerations that may lack gravity, lie in axes of the Earth, or are what a
+filter computes of others."""
 
 SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "noise")
 """Words of columns that hold how much values scatter."""

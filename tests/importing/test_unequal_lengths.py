@@ -59,3 +59,11 @@ def test_gravity_with_any_bias_has_one_length() -> None:
     for bias in ([0, 0, 0], [2.4, 0, 0], [0, -1.5, 1.5]):
         assert unequal_lengths(rows + bias) is None
         assert unequal_lengths(rows[: len(rows) // 2] + bias) is None
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_without_an_axis_lengths_tell_nothing(axis: int) -> None:
+    """Which is a dead one: it is said of the recording, and not asked about."""
+    rows = turned(2, 50.0)[:, 1:4]
+    rows[:, axis] = 0.02
+    assert unequal_lengths(rows) is None

@@ -116,7 +116,7 @@ def _values(line: str) -> list[NestedValue]:
 
     >>> _values("Acc = V { Unit = G, Data = <1, 2, 3> }")[2]
     NestedValue(name='Acc_Data_z', unit='G', text='3')
-    >>> _values("Acc = 1, 2, 3"), _values("[1, 2, 3] of (4, 5)")
+    >>> _values("Acc = 1, 2, 3"), _values("[1, 2, 3]")
     ([], [])
     """
     if len(line) > LONGEST or not any(sign in line for sign in OPEN):

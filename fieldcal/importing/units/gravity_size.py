@@ -108,11 +108,11 @@ def estimate_gravity(acc: Array) -> GravityReading | None:
 def unequal_lengths(acc: Array) -> tuple[float, float] | None:
     """Lengths that numbers (n, 3) have where they change least, if (1) fits none.
 
-    Gravity is the same at every rest. None if they are alike, lie on a sphere, or are
-    too few to tell. Rows of zeros hold nothing.
+    Gravity is the same at every rest. None if they are alike, lie on a sphere, are too
+    few to tell, or an axis is dead. Rows of zeros hold nothing.
     """
     acc = _readings(acc[acc.any(axis=1)])
-    if len(acc) < MIN_ROWS or are_means(acc):
+    if len(acc) < MIN_ROWS or are_means(acc) or not np.ptp(acc, axis=0).all():
         return None
     quiet = _quiet_means(acc)
     low, high = np.quantile(np.linalg.norm(quiet, axis=1), (0.1, 0.9)).tolist()

@@ -38,8 +38,9 @@ class HeldValues:
             changes = (np.vstack([last, rows[:-1]]) != rows).any(axis=1)
             edges = np.flatnonzero(changes)
             if len(edges):
-                runs.update([before + int(edges[0])])
-                runs.update(np.diff(edges).tolist())
+                runs[before + int(edges[0])] += 1
+                lengths, many = np.unique(np.diff(edges), return_counts=True)
+                runs.update(dict(zip(lengths.tolist(), many.tolist(), strict=True)))
                 before = -int(edges[-1])
             self._open[sensor] = (rows[-1], before + len(rows))
 
@@ -50,7 +51,9 @@ class HeldValues:
             number = sum(runs.values())
             if number < MIN_RUNS:
                 continue
-            usual = float(np.median([*runs.elements()]))
+            lengths = sorted(runs)
+            passed = np.cumsum([runs[n] for n in lengths])
+            usual = lengths[int(np.searchsorted(passed, number / 2))]  # the median
             near = sum(many for n, many in runs.items() if n > usual / 2) / number
             if usual > 1 and near >= USUAL:
                 mean = sum(n * many for n, many in runs.items()) / number

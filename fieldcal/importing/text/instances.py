@@ -18,7 +18,7 @@ NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "a
          "unit", "idx", "dev", "mac", "module", "devicename", "设备名称"}  # fmt: skip
 """Names of columns that tell devices apart, without "id" at their end."""
 
-AXES = 3
+FEWEST_COLUMNS = 3
 """Columns behind the name of an IMU: of its axes; one of them may be a time."""
 
 MAX_INSTANCES = 16
@@ -103,7 +103,7 @@ def _is_silent(rows: Sequence[Sequence[str]], i: int, name: str) -> bool:
     own = [row[i + 1 :] for row in rows if row[i] == name]
     zeros = [all(is_number(cell, False) and float(cell) == 0 for cell in cells)
              for cells in zip(*own, strict=True)]  # fmt: skip
-    return len(zeros) >= AXES and sum(zeros) >= len(zeros) - 1
+    return len(zeros) >= FEWEST_COLUMNS and sum(zeros) >= len(zeros) - 1
 
 
 def _in_turn(column: Sequence[str]) -> bool:

@@ -14,12 +14,16 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple, Self
 
-from fieldcal.importing.text.labels import ARRIVAL, LEVEL, LONGEST, labelled_values
+from fieldcal.importing.text.labels import (
+    ARRIVAL,
+    AXES,
+    LEVEL,
+    LONGEST,
+    labelled_values,
+)
 from fieldcal.importing.text.log_prefixes import log_prefix
 from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
 from fieldcal.importing.words.heading_words import heading_meaning
-
-AXES = ("x", "y", "z")
 
 FEWEST = 3
 """Values of a line: the axes of a sensor."""

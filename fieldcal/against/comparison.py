@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.against import causes, offsets, prediction, samples
+from fieldcal.against import causes, offsets, prediction
 from fieldcal.against.facts import recording_facts
 from fieldcal.against.filters import filter_difference
+from fieldcal.against.lines_and_faults import compare_lines_and_faults
+from fieldcal.against.noise_levels import noise_differences
 from fieldcal.against.pairing import CausePairing
 from fieldcal.against.result import Difference, Match, verdict_of
 from fieldcal.against.side import DiagnosedRecording, diagnose_side
@@ -43,13 +45,14 @@ def compare(
 def compare_sides(real: DiagnosedRecording, sim: DiagnosedRecording) -> Match:
     """Compare two diagnosed recordings."""
     found = causes.decide_causes(CausePairing(real, sim))
+    in_samples, alike = compare_lines_and_faults(real, sim)
     apart = [
         *causes.differences(found),
         *offsets.calibration_differences(found),
         *offsets.earth_rate_difference(found),
         *filter_difference(found),
-        *samples.line_and_fault_differences(real, sim),
-        *samples.noise_differences(real, sim),
+        *in_samples,
+        *noise_differences(real, sim),
     ]
     apart.sort(key=lambda d: -d.probability)
     differences = tuple(d for d in apart if d.probability >= thresholds.DIFFERS)
@@ -67,7 +70,7 @@ def compare_sides(real: DiagnosedRecording, sim: DiagnosedRecording) -> Match:
         verdict,
         _probability(found, differences),
         differences,
-        causes.shared_causes(found),
+        (*causes.shared_causes(found), *alike),
         *predicted,
         recording_facts(real, found.real),
         recording_facts(sim, found.sim),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.against import causes, offsets
+from fieldcal.against.noise_levels import noise_level
 from fieldcal.against.result import Facts
-from fieldcal.against.samples import noise_level
 from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet
 from fieldcal.core.samples import CHANNELS

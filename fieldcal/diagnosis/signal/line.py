@@ -104,6 +104,25 @@ def tune_line(pieces: WindowSamples, effect: Line, moments: Moments) -> Spectral
     )
 
 
+def measured_amplitudes(
+    pieces: WindowSamples, effect: Line, hz: float
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Amplitudes of an effect at one frequency, those within the noise among them.
+
+    Returns
+    -------
+    values, sigmas : by parameter name
+
+    """
+    at, here = np.zeros(1), moments_of(pieces, hz)
+    causes, sigma, _ = _fit_causes(pieces, effect, here, at, least=0.0)
+    if pieces.usable:
+        amplitude = effect.response(pieces.x, hz) @ causes[0]
+        again = moments_of(pieces.with_whole_line(hz, amplitude), hz)
+        causes, sigma, _ = _fit_causes(pieces, effect, again, at, least=0.0)
+    return _named_amplitudes(effect, causes[0], sigma[0])
+
+
 def line_remainder(pieces: WindowSamples, tone: SpectralLine) -> LineRemainder:
     """Mean squares that are left of a line, after its fit and after its prediction."""
     many = len(pieces.samples) >= MIN_HELD_OUT_WINDOWS
@@ -176,9 +195,15 @@ def _parabola_peak(offsets: Array, chi2: Array) -> float:
 
 
 def _fit_causes(
-    pieces: WindowSamples, effect: Line, moments: Moments, offset: Array
+    pieces: WindowSamples,
+    effect: Line,
+    moments: Moments,
+    offset: Array,
+    least: float = thresholds.LINE_SIGMAS,
 ) -> tuple[Complex, Array, Array]:
     """Fit the causes of an effect at slightly different frequencies, `offset` (o,) Hz.
+
+    Causes of single outputs below `least` standard deviations are dropped.
 
     Returns
     -------
@@ -203,7 +228,7 @@ def _fit_causes(
     own = np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2)
     sigma = np.sqrt(own.real)
     if effect.kind == "sensor":  # each output has its own cause: drop those at noise
-        causes = np.where(np.abs(causes) > thresholds.LINE_SIGMAS * sigma, causes, 0.0)
+        causes = np.where(np.abs(causes) > least * sigma, causes, 0.0)
     left = measured - response @ causes[..., None]
     fallen = np.abs(measured) ** 2 - np.abs(left) ** 2
     return causes, sigma, fallen[..., 0] @ weight

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Block
-from fieldcal.diagnosis.signal.line import LineRemainder, line_remainder, tune_line
+from fieldcal.diagnosis.signal.line import (
+    LineRemainder,
+    line_remainder,
+    measured_amplitudes,
+    tune_line,
+)
 from fieldcal.diagnosis.signal.moments import moments_of
 from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import WindowSamples, samples_of_windows
@@ -146,3 +151,19 @@ def test_what_never_changes_has_no_line_of_rounding() -> None:
     pieces = samples_of_windows(source, reduce_to_rows(source))
     assert len(pieces.samples) == 2
     assert not any(samples.any() for samples in pieces.samples)
+
+
+def test_amplitudes_within_the_noise_are_measured() -> None:
+    """The power is that of wave and noise; sigma is that of each part of the noise."""
+    powers, sigmas = [], []
+    for seed in range(40):
+        values, told = measured_amplitudes(recorded(seed, 6, 800), Hum(), HZ)
+        assert values.keys() == told.keys() == {"ax", "ay", "az", "gx", "gy", "gz"}
+        powers.append([values["ay"] ** 2, values["az"] ** 2])
+        sigmas.append(told["ay"])
+    noise = 4 * SIGMA**2 / (6 * 800)
+    assert np.allclose(2 * np.square(sigmas), noise, rtol=0.01)
+    # |A|^2 has a mean of a^2 + s^2 and a variance of s^4 + 2 a^2 s^2
+    for power, size in zip(np.mean(powers, axis=0), (SIZE, 0.0), strict=True):
+        spread = np.sqrt((noise**2 + 2 * size**2 * noise) / 40)
+        assert abs(power - size**2 - noise) < 4 * spread

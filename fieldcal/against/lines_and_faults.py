@@ -1,32 +1,26 @@
-"""Differences in samples: noise, lines in the spectrum, faults of the signal chain."""
+"""Differences in lines of the spectrum and in faults of the signal chain.
+
+A line that both recordings have can rise above the noise of a channel in one of them
+only. There, its amplitude is measured in the other too: it is not taken for zero.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.against.joint import probability_of_difference
 from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.against.side import DiagnosedRecording
-from fieldcal.core.samples import CHANNELS
-from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.findings.sample_effects import effect_of_line
 from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quantity
-from fieldcal.diagnosis.signal.line import tune_line
+from fieldcal.diagnosis.signal.line import measured_amplitudes, tune_line
 from fieldcal.diagnosis.signal.moments import moments_of
 from fieldcal.diagnosis.signal.pieces import samples_of_windows
 from fieldcal.effects import catalogue
-from fieldcal.model import thresholds
 from fieldcal.physics.effect import Chain, Line
-
-NOISE_LOG_SPREAD = 0.5
-"""Typical difference of the noise of two devices, ln."""
-
-NO_NOISE_RATIO = 1e-3
-"""Noise, relative to the other recording's, that counts as none."""
 
 CERTAIN = 5.0
 """Difference of two sizes of a fault that is significant, standard deviations."""
@@ -45,91 +39,78 @@ APART_HZ = 0.5
 """Largest frequency difference of the same line, in cycles per recording."""
 
 
-def noise_level(one: DiagnosedRecording, c: int) -> Quantity:
-    """Noise of one channel."""
-    level = float(one.noise[c])
-    return Quantity(level, level * float(one.noise_uncertainty[c]), UNITS[c // 3])
-
-
-def noise_differences(
+def compare_lines_and_faults(
     real: DiagnosedRecording, sim: DiagnosedRecording
-) -> Iterator[Difference]:
-    """Differences in the noise of each triad."""
-    for part in (slice(0, 3), slice(3, 6)):
-        seen = np.isfinite(real.noise[part]) & np.isfinite(sim.noise[part])
-        at = np.flatnonzero(seen & (real.noise[part] > 0)) + part.start
-        if len(at):
-            yield from _triad_noise_difference(real, sim, at.tolist())
+) -> tuple[list[Difference], tuple[str, ...]]:
+    """Compare lines of the spectrum and faults of samples.
 
+    Returns
+    -------
+    differences, alike : what differs, and the ids of what both have with the same size
 
-def _triad_noise_difference(
-    real: DiagnosedRecording, sim: DiagnosedRecording, at: Sequence[int]
-) -> Iterator[Difference]:
-    """Difference of one triad, by the logarithms of its noise levels."""
-    one = real.noise[at]
-    two = np.maximum(sim.noise[at], NO_NOISE_RATIO * one)
-    off = np.log(one / two)
-    sigma = np.hypot(real.noise_uncertainty[at], sim.noise_uncertainty[at])
-    probability = probability_of_difference(
-        off, np.diag(sigma**2), np.full(len(at), NOISE_LOG_SPREAD)
-    )
-    if probability < thresholds.NAMED:
-        return
-    pairs = {
-        CHANNELS[c]: RealAndSimulated.of(noise_level(real, c), noise_level(sim, c))
-        for c in at
-    }
-    silent = bool((sim.noise[at] <= NO_NOISE_RATIO * one).all())
-    louder = [
-        c
-        for c, o, s in zip(at, off, sigma, strict=True)
-        if abs(o) > thresholds.STANDS_OUT * s
-    ]
-    where = tuple(
-        _mismatch_of_channel(real, CHANNELS[c], pairs[CHANNELS[c]]) for c in louder
-    )
-    yield Difference(
-        "noise", "left_out" if silent else "resized", probability, pairs, where=where
-    )
-
-
-def _mismatch_of_channel(
-    one: DiagnosedRecording, channel: str, pair: RealAndSimulated
-) -> Mismatch:
-    """The mismatch of a channel in all samples."""
-    positions = one.explanation.prepared.source.about.position_numbers or (0,)
-    off = pair.difference
-    size = abs(float(off.value))
-    return Mismatch(
-        channel=channel,
-        kind="samples",
-        positions=tuple(sorted(positions)),
-        from_s=float(one.block.t[0]),
-        to_s=float(one.block.t[-1]),
-        covariate="noise",
-        rms=size,
-        sigma=size / off.sigma if off.sigma else np.inf,
-    )
-
-
-def line_and_fault_differences(
-    real: DiagnosedRecording, sim: DiagnosedRecording
-) -> Iterator[Difference]:
-    """Differences in lines of the spectrum and in faults of samples."""
+    """
     ours, theirs = _found_in_samples(real), _found_in_samples(sim)
     length = min(float(np.ptp(s.block.t)) for s in (real, sim))
+    apart: list[Difference] = []
+    alike: list[str] = []
     for one in ours:
         two = next((f for f in theirs if _is_same(one, f, length)), None)
         if two is not None:
             theirs.remove(two)
-        yield from _difference(one, two or _faint_line(one, sim), real)
+        found = _line_or_fault(one, two or _faint_line(one, sim), real, sim)
+        apart += [found] if found else []
+        alike += [] if found else [one.id]
     for two in theirs:
-        for found in _difference(two, _faint_line(two, real), sim):
-            yield replace(
-                found,
-                direction="added" if found.direction == "left_out" else "resized",
-                parameters={n: _exchanged(p) for n, p in found.parameters.items()},
-            )
+        found = _line_or_fault(two, _faint_line(two, real), sim, real)
+        apart += [_seen_from_recording(found)] if found else []
+        alike += [] if found else [two.id]
+    differing = {d.id for d in apart}
+    return apart, tuple(dict.fromkeys(n for n in alike if n not in differing))
+
+
+def _seen_from_recording(found: Difference) -> Difference:
+    """A difference found from the simulator's side."""
+    return replace(
+        found,
+        direction="added" if found.direction == "left_out" else "resized",
+        parameters={n: _exchanged(p) for n, p in found.parameters.items()},
+    )
+
+
+def _line_or_fault(
+    one: FoundEffect,
+    two: FoundEffect | None,
+    source: DiagnosedRecording,
+    other: DiagnosedRecording,
+) -> Difference | None:
+    """The difference of an effect of `source` from that of `other`, if there is one.
+
+    A line that both have may be above the noise of a channel in one of them only.
+    """
+    if two is not None:
+        one, two = _measured_too(one, two, source), _measured_too(two, one, other)
+    return _difference(one, two, source)
+
+
+def _measured_too(
+    one: FoundEffect, as_in: FoundEffect, source: DiagnosedRecording
+) -> FoundEffect:
+    """A line with the amplitudes, though within its noise, that another has."""
+    effect, missing = catalogue()[one.id], as_in.parameters.keys() - one.parameters
+    if not isinstance(effect, Line) or not missing:
+        return one
+    explanation = source.explanation
+    pieces = samples_of_windows(explanation.prepared.source, explanation.rows)
+    if not pieces.samples:
+        return one
+    hz = float(one.parameters["hz"].value)
+    values, sigmas = measured_amplitudes(pieces, effect, hz)
+    more = {
+        n: Quantity(values[n], sigmas[n], as_in.parameters[n].unit)
+        for n in as_in.parameters
+        if n in missing and n in values
+    }
+    return replace(one, parameters={**one.parameters, **more})
 
 
 def _exchanged(pair: RealAndSimulated) -> RealAndSimulated:
@@ -189,7 +170,7 @@ def _combined_sigma(one: FoundEffect, two: FoundEffect, name: str) -> float:
 
 def _difference(
     one: FoundEffect, two: FoundEffect | None, source: DiagnosedRecording
-) -> Iterator[Difference]:
+) -> Difference | None:
     """The difference of an effect, if `two` is None or has another size."""
     pairs = {}
     for name, q in one.parameters.items():
@@ -199,8 +180,8 @@ def _difference(
             RealAndSimulated(q, other, q) if word else RealAndSimulated.of(q, other)
         )
     if two is not None and not any(_sizes_differ(n, p) for n, p in pairs.items()):
-        return
-    yield Difference(
+        return None
+    return Difference(
         one.id,
         "left_out" if two is None else "resized",
         one.probability,

@@ -1,0 +1,66 @@
+"""A line that both have, where a channel shows it above its noise in one of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from strapdown_sessions import DEVICE, played
+
+from fieldcal.against.lines_and_faults import compare_lines_and_faults
+from fieldcal.against.side import DiagnosedRecording, diagnose_side
+
+HZ, LOUD = 7.3, 0.02
+"""Hz, and amplitude on a_x, m/s^2: 60 standard deviations."""
+
+CLEAR, FAINT = 0.0026, 0.0008
+"""Amplitudes on a_y, m/s^2: 7 and 2 standard deviations."""
+
+
+def humming(seed: int, weak: float) -> DiagnosedRecording:
+    """The device with a line on two channels."""
+    block, about = played(DEVICE, seed)
+    wave = np.sin(2 * np.pi * HZ * block.t)
+    acc = block.acc + np.outer(wave, [LOUD, weak, 0.0])
+    return diagnose_side("simulator", replace(block, acc=acc), about)
+
+
+def told(one: DiagnosedRecording) -> set[str]:
+    """Parameters of the line in its own diagnosis."""
+    (hum,) = (e for e in one.diagnosis.effects if e.id == "hum")
+    return set(hum.parameters)
+
+
+@pytest.fixture(scope="module")
+def clear() -> DiagnosedRecording:
+    return humming(1, CLEAR)
+
+
+@pytest.fixture(scope="module")
+def faint() -> DiagnosedRecording:
+    return humming(4, FAINT)
+
+
+def test_an_amplitude_within_the_noise_is_measured(
+    clear: DiagnosedRecording, faint: DiagnosedRecording
+) -> None:
+    """It is not zero, from which the clear one differs by 7 standard deviations."""
+    assert told(clear) == {"ax", "ay", "hz"} and told(faint) == {"ax", "hz"}
+    assert compare_lines_and_faults(clear, faint) == ([], ("hum",))
+    assert compare_lines_and_faults(faint, clear) == ([], ("hum",))
+
+
+def test_a_channel_without_the_line_is_a_difference(faint: DiagnosedRecording) -> None:
+    loud = humming(3, 2 * CLEAR)
+    for one, two, sign in ((loud, faint, 1), (faint, loud, -1)):
+        (found,), alike = compare_lines_and_faults(one, two)
+        assert (found.id, found.direction, alike) == ("hum", "resized", ())
+        apart = {"ax": 0.0, "ay": 2 * CLEAR - FAINT, "hz": 0.0}
+        assert found.parameters.keys() == apart.keys()
+        for name, true in apart.items():
+            pair = found.parameters[name]
+            assert pair.real is not None and pair.simulator is not None
+            sigma = pair.difference.sigma
+            assert sigma is not None
+            assert abs(float(pair.difference.value) - sign * true) < 4 * sigma

@@ -6,7 +6,10 @@ t_0 = at_s, device time, s; theta is small, about x or z of the base, e that axi
 those of the device, so that this is a `base_tilt` from an instant on. A mean over the
 instant has its part. To one position it is a jump of the biases; each further one shows
 it along other axes of the device. The knock itself is left out as a bump, and a turn
-during which the base goes over closes less well. Source: kinematics of a small rotation
+during which the base goes over closes less well.
+
+A position whose angles nobody knows shows it only if it happens there: the force turns
+about two axes across it, and keeps its length. Source: kinematics of a small rotation
 (Titterton and Weston 2004, 3.6); a table that is pushed, a tripod that is kicked.
 
 >>> import numpy as np
@@ -25,6 +28,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.effects.bias_step import BiasStep
@@ -60,12 +64,20 @@ class BaseStep(Separable):
         return BiasStep().course(x, shape)
 
     def pattern(self, x: Experience) -> Array:
-        """Change of the outputs at rest for a degree about each axis, (n, 6, 2)."""
-        rows = np.flatnonzero(_at_rest_in_known_position(x))
+        """Change of the outputs at rest for a degree about each axis, (n, 6, 2).
+
+        Where the angles are not known, the axes are any two across the force.
+        """
+        known = _at_rest_in_known_position(x)
+        rows = np.flatnonzero(known | _at_rest_in_free_position(x))
         out = np.zeros((len(x), 6, 2))
         if not len(rows):
             return out
-        axes = x.to_device[rows][:, :, [0, 2]]
+        axes = np.where(
+            known[rows, None, None],
+            x.to_device[rows][:, :, [0, 2]],
+            _axes_across(x.f[rows]),
+        )
         # what a rate table adds is tilted with the base
         rate = np.where(x.rate.any(axis=1, keepdims=True), 0.0, x.w)
         turned = [-np.cross(axes, v[rows, :, None], axis=1) for v in (x.f, rate)]
@@ -73,9 +85,21 @@ class BaseStep(Separable):
         return out
 
 
-def _at_rest_in_known_position(
-    x: Experience,
-) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _at_rest_in_known_position(x: Experience) -> NDArray[np.bool_]:
     """Rows at rest in a known position."""
-    held: np.ndarray[tuple[int], np.dtype[np.bool_]] = x.oriented & (x.position >= 0)
+    held: NDArray[np.bool_] = x.oriented & (x.position >= 0)
     return held
+
+
+def _at_rest_in_free_position(x: Experience) -> NDArray[np.bool_]:
+    """Rows at rest whose angles nobody knows."""
+    held: NDArray[np.bool_] = ~x.oriented & (x.position >= 0) & ~x.rate.any(axis=1)
+    return held
+
+
+def _axes_across(f: Array) -> Array:
+    """Two axes across each force, in those of the device, (n, 3, 2)."""
+    up = f / np.maximum(np.linalg.norm(f, axis=1, keepdims=True), 1e-12)
+    one = np.cross(up, np.eye(3)[np.argmin(np.abs(up), axis=1)])
+    one /= np.maximum(np.linalg.norm(one, axis=1, keepdims=True), 1e-12)
+    return np.stack([one, np.cross(one, up)], axis=2)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from session_folders import CALM, FACES, WIDE, places, recorded, write_session
 
 from fieldcal.cli import main
@@ -46,14 +47,56 @@ def test_it_is_a_small_tilt_of_the_base_from_the_instant_on() -> None:
 
 
 def test_it_is_nothing_of_the_device() -> None:
-    """Not where nothing is felt, not on the way, not where nobody knows the angles."""
+    """Not where nothing is felt, not on the way, not where all angles are unknown."""
     x = rows()
     assert not step(replace(x, f=0 * x.f, w=0 * x.w), -1.0).any()
     assert not step(replace(x, position=np.full(12, -1)), -1.0).any()
     unknown = replace(x, alpha=np.full(12, np.nan))
-    assert not step(unknown, -1.0).any()
     assert not catalogue()["base_step"].applies(unknown)
     assert not catalogue()["base_step"].applies(replace(x, position=0 * x.position))
+
+
+def test_a_force_of_unknown_direction_turns_and_keeps_its_length() -> None:
+    """By whole rotations about the two axes, of which any turn of the force is made."""
+    x = replace(rows(), alpha=np.full(12, np.nan))
+    by, small = step(x, -1.0), 1e-5
+    assert not step(replace(x, rate=np.ones((12, 3))), -1.0).any()  # a table turns it
+    up = x.f / np.linalg.norm(x.f, axis=1, keepdims=True)
+    for j in (0, 1):
+        axis = np.cross(up, by[:, :3, j])
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        turned = Rotation.from_rotvec(np.deg2rad(small) * axis).apply(x.f)
+        np.testing.assert_allclose((turned - x.f) / small, by[:, :3, j], atol=1e-6)
+    assert np.allclose((by[:, :3, 0] * by[:, :3, 1]).sum(axis=1), 0.0, atol=1e-9)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("conceals", ["base_step", "bias_step"])
+def test_a_knock_in_a_position_of_unknown_angles_is_no_jump_of_biases(
+    conceals: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Which would change the length of the force there."""
+    taken = places([*WIDE[:5], (60.0, 20.0), (-50.0, -30.0)])
+    at = taken[-1]["start_s"] + 5.0
+    numbers = {
+        "base_step": {"about_x_deg": 0.15, "about_z_deg": -0.2, "at_s": at},
+        "bias_step": {"ax": 0.02, "ay": 0.03, "az": -0.02, "at_s": at},
+    }
+    hidden = checked_effect(conceals, numbers[conceals])
+    profile = replace(CALM, effects=(*CALM.effects, hidden))
+    block = recorded(profile, taken, 5)
+    for one in taken[-2:]:
+        del one["alpha_deg"], one["beta_deg"]
+    write_session(tmp_path / "s", block, taken)
+    main(["solve", str(tmp_path / "s"), "--json", "--angles", "0.002"])
+    said = json.loads(capsys.readouterr().out)
+    causes = said["carried"]["causes"]
+    assert causes[conceals] > 0.9
+    jumped = [numbers["bias_step"][n] for n in ("ax", "ay", "az")]
+    end = np.array(jumped) if conceals == "bias_step" else np.zeros(3)
+    bias = said["parameters"]["acc_bias"]
+    off = np.array(bias["value"]) - profile.truth.acc_bias - end
+    assert (np.abs(off) < 4 * np.array(bias["sigma"])).all()
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ USUAL: Mapping[str, float] = {
 
 TIMED = (
     *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift", "bias_step"),
-    *("settling", "hum", "base_step", "joint_creep"),
+    *("settling", "hum", "base_step", "mount_slip", "joint_creep"),
 )
 EQUATIONS = (*USUAL, *TIMED, "sway", "time_delay", "heading_error")
 """Effects with numbers that can be made larger and smaller."""
@@ -58,7 +58,7 @@ FIXED = ("tau_s", "at_s", "hz", "azimuth_deg", "phase_deg", "level")
 LARGEST = {
     **{"base_tilt": 5.0, "angle_offset": 5.0, "thermal_hysteresis": 2.0},
     **{"lever_arm": 0.5, "time_delay": 0.06, "sway": 0.3, "heading_error": 60.0},
-    **{"base_step": 2.0, "joint_creep": 1.0},
+    **{"base_step": 2.0, "mount_slip": 1.0, "joint_creep": 1.0},
 }
 ANYWHERE = ("warm_up", "bias_drift", "bias_step", "hum", "temperature_bias")
 """Effects that one long recording in one position shows as well."""
@@ -85,6 +85,12 @@ def drawn(name: str, rng: np.random.Generator, span: float) -> Values:
         "bias_step": both | {"at_s": float(rng.uniform(0.25, 0.75) * span)},
         "base_step": {
             "about_x_deg": float(rng.normal(0, 0.1)),
+            "about_z_deg": float(rng.normal(0, 0.1)),
+            "at_s": float(rng.uniform(0.25, 0.75) * span),
+        },
+        "mount_slip": {
+            "about_x_deg": float(rng.normal(0, 0.1)),
+            "about_y_deg": float(rng.normal(0, 0.1)),
             "about_z_deg": float(rng.normal(0, 0.1)),
             "at_s": float(rng.uniform(0.25, 0.75) * span),
         },

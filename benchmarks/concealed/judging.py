@@ -16,8 +16,8 @@ from fieldcal.physics.effect import Line
 ALWAYS = frozenset({"earth_rate"})
 """True of every session, so never a false alarm."""
 
-AS_WELL = {"base_step": frozenset({"bump"})}
-"""What else is there with an effect: a base that is knocked bumps what stands on it."""
+AS_WELL = {name: frozenset({"bump"}) for name in ("base_step", "mount_slip")}
+"""What else is there with an effect: what is knocked, or slips, is bumped."""
 
 
 @dataclass(frozen=True)

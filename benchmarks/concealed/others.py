@@ -26,7 +26,7 @@ APART = (
     {"quadratic", "scale_asymmetry", "cubic", "pendulous_products"},
     {
         *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift"),
-        *("bias_step", "base_step"),
+        *("bias_step", "base_step", "mount_slip"),
     },
     {"temperature_bias", "temperature_scale"},
     {"gyro_scale", "gyro_cross_coupling", "angle_scale", "angle_offset", "sway"},

@@ -55,6 +55,9 @@ GROUPED = {
         "table tilted", "table kicked", "ground gives way", "level and angles not said",
         "level said wrongly",
     ),
+    "a device that slips in its mount": (
+        "slips in its mount",
+    ),
     "latitude not said, its sign wrong, gravity wrong": (
         "latitude not said", "only gravity said", "other hemisphere",
         "gravity said wrongly",

@@ -11,8 +11,9 @@ Written apart from everything that estimates. Device axes, m/s^2 and rad/s:
     U += c e^(-t/T), W += d e^(-t/T)           a device that warms up
 
 Sway turns the base about its level axis by a sine, a kick by an angle that stays, and
-soft ground gives way by an angle that ends in e^(-t/T). Vibration and sway may act in
-some spans of time alone.
+soft ground gives way by an angle that ends in e^(-t/T). In a mount that is loose the
+device slips by an angle about an axis of its own, which stays. Vibration and sway may
+act in some spans of time alone.
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ class Acting:
     acc_cold, gyr_cold, warming : what biases are off by at first, and T, s
     kicked, kick_s : rad by which the base is turned for good, and when
     sinking, sinks_s : rad by which soft ground gives way at last, and T, s
+    slips, slip_s : rad about each axis by which the device slips, and when
 
     """
 
@@ -65,6 +67,8 @@ class Acting:
     kick_s: float = 0.0
     sinking: float = 0.0
     sinks_s: float = 1.0
+    slips: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    slip_s: float = 0.0
 
     def tilted(self, t: Floats) -> tuple[Floats, Floats]:
         """Tilt of a base that sways, is kicked or sinks, rad; its rate, rad/s, (n,)."""
@@ -77,6 +81,16 @@ class Acting:
         turned = here * sway + self.kicked * kick + self.sinking * (1 - left)
         rate = here * rate + coming * sway + self.kicked * kicking
         return turned, rate + self.sinking / self.sinks_s * left
+
+    def slid(self, t: Floats, f: Floats, w: Floats) -> tuple[Floats, Floats]:
+        """Force and rate as a device that slips has them, (n, 3) each."""
+        size = float(np.linalg.norm(self.slips))
+        if not size:
+            return f, w
+        axis = np.array(self.slips) / size
+        share, speed = _step(t, self.slip_s)
+        f, w = (_turned_by(-size * share, axis, v) for v in (f, w))
+        return f, w + size * speed[:, None] * axis
 
     def _acts(self, t: Floats) -> tuple[Floats, Floats]:
         """How much vibration and sway act, 0 to 1, and its rate, 1/s, (n,) each."""
@@ -136,6 +150,14 @@ def _step(t: Floats, at: float) -> tuple[Floats, Floats]:
     part = np.clip((t - at) / KICK_S, 0.0, 1.0)
     value = part - np.sin(2 * np.pi * part) / (2 * np.pi)
     return value, (1 - np.cos(2 * np.pi * part)) / KICK_S
+
+
+def _turned_by(angle: Floats, axis: Floats, vectors: Floats) -> Floats:
+    """Vectors turned by angles (n,) about an axis, by Rodrigues' formula, (n, 3)."""
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    along = (vectors @ axis)[:, None] * axis
+    out: Floats = cos * vectors + sin * np.cross(axis, vectors) + (1 - cos) * along
+    return out
 
 
 def _filtered(values: Floats, t: Floats, constant: float) -> Floats:

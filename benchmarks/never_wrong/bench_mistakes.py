@@ -141,6 +141,15 @@ def kicked(bench: Bench, rng: Rng) -> Bench:
     return acting(bench, kicked=size, kick_s=float(rng.uniform(start, end)))
 
 
+def slipping(bench: Bench, rng: Rng) -> Bench:
+    """The device slips by 0.02 to 1 degrees in its mount, at rest or on the way."""
+    axis = rng.normal(size=3)
+    size = np.deg2rad(log_uniform(rng, 0.02, 1.0)) / np.linalg.norm(axis)
+    x, y, z = (size * axis).tolist()
+    when = float(rng.uniform(bench.windows[0, 0], bench.windows[-1, 1]))
+    return acting(bench, slips=(x, y, z), slip_s=when)
+
+
 def sinking(bench: Bench, rng: Rng) -> Bench:
     """Soft ground gives way by 0.02 to 0.5 degrees, in 50 to 500 s."""
     size = float(np.deg2rad(log_uniform(rng, 0.02, 0.5))) * float(rng.choice([-1, 1]))
@@ -165,6 +174,7 @@ BEFORE: dict[str, Before] = OF_FIXTURE | {
     "warm-up": warming,
     "table kicked": kicked,
     "ground gives way": sinking,
+    "slips in its mount": slipping,
 }
 
 

@@ -65,6 +65,7 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
     w += speed[:, 1:] * np.array([np.cos(bench.skew), 0.0, -np.sin(bench.skew)])
     w += speed[:, :1] * turned(0 * beta, beta, np.array([0.0, 0.0, 1.0]), bench.skew)
     f, w = to_device(bench.mounting, f), to_device(bench.mounting, w)
+    f, w = bench.acting.slid(t, f, w)
     f = bench.acting.felt(t, f, w)
     acc, gyr = bench.device.adds(t, f, w)
     acc += bench.acc_bias + bench.acc_scale * f

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from simulated import PLAIN, A, F, added, at_rest, told
 
 from fieldcal.core import frames
@@ -98,6 +99,21 @@ def test_a_base_that_is_knocked_stays_as_it_then_stands() -> None:
     assert not more[:6000].any() and not more[6100:, 3:].any()
     turned = more[:, 3:].sum(axis=0) / 100  # at 100 Hz
     np.testing.assert_allclose(turned, held @ tilt, atol=1e-5)
+
+
+def test_a_device_that_slips_feels_its_own_turn_and_stays_so() -> None:
+    """By a rotation matrix; gyroscopes measure the same turn."""
+    given = {"about_x_deg": 3.0, "about_y_deg": 1.0, "about_z_deg": -2.0}
+    words = ",".join(f"{name}={value}" for name, value in given.items())
+    slipped = at_rest(told(f"mount_slip:{words},at_s=60")).six
+    before = at_rest(PLAIN).six
+    slip = np.deg2rad(list(given.values()))
+    turned = Rotation.from_rotvec(slip).inv().apply(before[6100:, :3])
+    np.testing.assert_allclose(slipped[6100:, :3], turned, atol=1e-9)
+    assert np.abs(slipped - before)[:6000].max() < 1e-12
+    assert np.abs((slipped - before)[6100:, 3:]).max() < 1e-12
+    seen = (slipped - before)[:, 3:].sum(axis=0) / 100  # at 100 Hz
+    np.testing.assert_allclose(seen, slip, atol=1e-5)
 
 
 def test_joints_that_creep_go_too_far_and_come_back() -> None:

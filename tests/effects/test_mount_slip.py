@@ -1,0 +1,57 @@
+"""A device that slips in its mount: what it does to rows and to a calibration."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from session_folders import CALM, WIDE, places, recorded, write_session
+
+from fieldcal.cli import main
+from fieldcal.core.frames import earth_rate_at_home
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Sensor
+from fieldcal.physics.experience import Experience
+from fieldcal.sim_device.vocabulary import checked_effect
+
+
+def test_it_turns_what_is_felt_in_every_row_from_the_instant_on() -> None:
+    """On the way between positions too; by rotations of the axes of the device."""
+    rng, slip = np.random.default_rng(3), catalogue()["mount_slip"]
+    alpha, beta = rng.uniform(-1.5, 1.5, (2, 12))
+    x = Experience.at_rest(
+        alpha, beta, 9.81, base_rate=earth_rate_at_home(0.9), lasts=np.ones(12)
+    )
+    x = replace(x, w=x.w + rng.normal(size=(12, 3)), position=np.arange(12) - 4)
+    assert isinstance(slip, Sensor)
+    by = slip.design(x, {"at_s": 5.2})
+    assert not by[:5].any()
+    part = np.r_[0.3, np.ones(6)]  # of row 5, which lasts from 4.5 to 5.5 s
+    for j, axis in enumerate(np.eye(3)):
+        up, down = (Rotation.from_rotvec(s * 1e-4 * axis).inv() for s in (1.0, -1.0))
+        turned = [(up.apply(v) - down.apply(v)) / 2e-4 for v in (x.f, x.w)]
+        whole = np.deg2rad(np.hstack(turned))
+        np.testing.assert_allclose(by[5:, :, j], part[:, None] * whole[5:], atol=1e-8)
+
+
+@pytest.mark.thorough
+def test_a_calibration_of_a_device_that_slips_is_right(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No step of the base, and none of the biases, is the same about all of them."""
+    taken = places(WIDE)
+    slip = {"about_x_deg": 0.2, "about_y_deg": -0.15, "about_z_deg": 0.25}
+    hidden = checked_effect("mount_slip", {**slip, "at_s": taken[6]["start_s"] + 7.0})
+    profile = replace(CALM, effects=(*CALM.effects, hidden))
+    write_session(tmp_path / "s", recorded(profile, taken, 5), taken)
+    main(["solve", str(tmp_path / "s"), "--json", "--angles", "0.002"])
+    said = json.loads(capsys.readouterr().out)
+    assert said["carried"]["causes"]["mount_slip"] > 0.9
+    for name in ("acc_bias", "acc_scale", "gyr_bias"):
+        found = said["parameters"][name]
+        off = np.array(found["value"]) - getattr(profile.truth, name)
+        assert (np.abs(off) < 4 * np.array(found["sigma"])).all(), name

@@ -15,7 +15,7 @@ from fieldcal.commands.repeated_option import StoreRepeated
 from fieldcal.commands.run_operator import run_operator
 from fieldcal.commands.run_page import LOCAL, serve_page, show_end_on_page
 from fieldcal.commands.run_results import report_broken_run, write_junit
-from fieldcal.commands.run_task import SESSIONS, make_task
+from fieldcal.commands.run_task import SESSIONS, make_room, make_task
 from fieldcal.commands.run_timeouts import (
     HEADLESS_PATIENCE_S,
     OPERATOR_PATIENCE_S,
@@ -265,6 +265,7 @@ def _record_and_solve(
         known = Session.open(folder) if args.resume else None
         taken = recorded_averages(known, task) if known else {}
         if not args.resume:
+            make_room(folder, args.headless)
             refuse_recorded_companions(folder, len(task.further))
         own = stack.enter_context(Recorder(folder, None if known else task.tables))
         args.records = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+import sys
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,6 +56,19 @@ def make_task(args: argparse.Namespace) -> tuple[PlanTask, Path]:
     )
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or SESSIONS / f"{stamp}-{task.procedure}"
+
+
+def make_room(folder: Path, headless: bool) -> None:
+    """Move an earlier run that took no position out of a new one's folder."""
+    from fieldcal.run.begun_before import set_untaken_aside
+    from fieldcal.run.operator.script import report_event
+
+    if aside := set_untaken_aside(folder):
+        said = f"an earlier run that took no position is now in {aside}"
+        if headless:
+            report_event("tell", text=said)
+        else:
+            sys.stderr.write(f"{said}\n")
 
 
 def _task_to_resume(args: argparse.Namespace) -> tuple[PlanTask, Path]:

@@ -101,7 +101,7 @@ class Engine:
         self._units = GyroUnitWatch(about.gravity)
         self._warned_of_unit = False
         self._desk = OperatorDesk(operator, recorder)
-        self._display = Display(operator, driver)
+        self._display = Display(operator, driver, self._left_out)
         self._incoming = IncomingSamples(
             driver, recorder, self._on_samples, self._on_piece
         )

@@ -91,25 +91,39 @@ class GyroUnitWatch:
         if fits[0].lsb != 1:
             return (
                 f"{said} send {fits[0]}, and are taken for rad/s; end this (q), and say"
-                " their range in the device's address"
+                " so in the device's address: the range, or where it takes units"
+                f" gyr_unit={1 / fits[0].lsb:.6g}*{fits[0].unit}"
             )
         return (
             f"{said} are in {fits[0].unit} and not in rad/s; end this (q) and begin"
             f" again with gyr_unit={fits[0].unit} in the device's address"
         )
 
+    def _last_means(self, moving: float) -> Array:
+        """Means (n, 7) of the time in which it did not come to rest; none of less."""
+        count = int(HINT_AFTER_S / MEAN_S)
+        enough = moving >= HINT_AFTER_S and len(self._means) >= count
+        return np.array(self._means)[-count:] if enough else np.zeros((0, 7))
+
+    def steady_norm(self, moving: float) -> float:
+        """Length of a force that is steady, though not at rest for `moving` s, m/s^2.
+
+        Steady in parts of its own length, whatever unit that is in; nan if it is not.
+        """
+        acc = self._last_means(moving)[:, 1:4]
+        if not len(acc):
+            return float("nan")
+        norm = float(np.linalg.norm(acc.mean(axis=0)))
+        steady = (acc.std(axis=0) < ACC_REST_SCATTER / self._gravity.size * norm).all()
+        return norm if steady else float("nan")
+
     def question(self, moving: float) -> str:
         """Question about the unit if the device has not come to rest for `moving` s.
 
         Empty unless it rests by its accelerometers, and no turn has shown the unit.
         """
-        lately = np.array(self._means)[-int(HINT_AFTER_S / MEAN_S) :]
-        if (
-            self.notice
-            or self._proved
-            or moving < HINT_AFTER_S
-            or len(lately) < HINT_AFTER_S / MEAN_S
-        ):
+        lately = self._last_means(moving)
+        if self.notice or self._proved or not len(lately):
             return ""
         if not (lately[:, 1:4].std(axis=0) < ACC_REST_SCATTER).all():
             return ""

@@ -119,7 +119,8 @@ class Screen:
         if view and hold is view.hold:
             lines += [Text(line) for line in widgets.short_gauges(view)]
         content, count = self._content, len(self._content.positions)
-        taken = Text(widgets.progress(content.taken, content.current_index, count))
+        now, out = content.current_index, content.left_out
+        taken = Text(widgets.progress(content.taken, now, count, out))
         room = self._console.height - 1 - len(self._console.render_lines(
             Group(*lines, taken)))  # fmt: skip
         lines += [*self._sentences(room), taken]

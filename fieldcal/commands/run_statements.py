@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import merge_tables, tables_of_options
-from fieldcal.core.errors import InputError
+from fieldcal.core.errors import InputError, SessionError, disk_says
 
 if TYPE_CHECKING:
     from fieldcal.session.folder import Session
@@ -52,7 +52,12 @@ def write_statements(args: argparse.Namespace, folder: Path) -> bool:
         return False
     session = Session.open(folder)
     _refuse_contradiction(session.about.raw, given, folder)
-    _write(session, given)
+    try:
+        _write(session, given)
+    except OSError as error:
+        raise SessionError(
+            f"{folder}: cannot be written: {disk_says(error)}"
+        ) from error
     return True
 
 

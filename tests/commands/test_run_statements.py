@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import tomllib
 from pathlib import Path
@@ -103,3 +104,17 @@ def test_what_cannot_be_or_is_being_recorded_changes_nothing(tmp_path: Path) -> 
         with pytest.raises(SessionError, match="records into it"):
             stated(folder, "--latitude", "50")
     assert (folder / "session.toml").read_bytes() == before
+
+
+def test_a_session_on_a_disk_that_takes_nothing_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A memory card whose lock is on, copied from another laptop."""
+
+    def refused(self: Path, *_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system", str(self))
+
+    folder = begun(tmp_path / "s")
+    monkeypatch.setattr(Path, "write_text", refused)
+    with pytest.raises(SessionError, match=r"s: cannot be written: the disk is read-o"):
+        stated(folder, "--latitude", "50")

@@ -25,7 +25,12 @@ from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Add, Hold, Judge, Note, Plan, Repeat, Step
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.incoming import SILENCES_UNTIL_TOLD, IncomingSamples
-from fieldcal.run.interruptions import WindowDisturbed, kept_notice, restart_notice
+from fieldcal.run.interruptions import (
+    WindowDisturbed,
+    is_motion,
+    kept_notice,
+    restart_notice,
+)
 from fieldcal.run.link_marks import MarkedRecorder
 from fieldcal.run.operator.desk import (
     OperatorDesk,
@@ -204,7 +209,7 @@ class Engine:
             except Moved as moved:
                 if self._give_up is not None:
                     raise
-                tries += 1
+                tries += is_motion(moved)
                 self._desk.tell(restart_notice(moved, tries))
                 continue
             if average is not None:

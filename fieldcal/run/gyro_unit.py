@@ -36,6 +36,9 @@ turn is enough than in an unknown recording."""
 HINT_AFTER_S = 5.0
 """Rest by the accelerometers alone after which changing rates are reported, s."""
 
+SMALLER_UNITS = {"deg/s": np.pi / 180, "mrad/s": 1e-3}
+"""Units that an address may state in place of rad/s, in rad/s."""
+
 
 class GyroUnitWatch:
     """Determines the unit of the angular rates from samples as they arrive.
@@ -85,8 +88,10 @@ class GyroUnitWatch:
         fits = fitting_scales(reads, GYR_SCALES, GYR_OUT[1])
         self.unit = fits[0].unit if fits and fits[0].lsb == 1 else ""
         self._proved = bool(fits) and fits[0].unit == "rad/s"
-        if not fits or self._proved:
+        if self._proved:
             return ""
+        if not fits:
+            return _taken_for_less(reads)
         said = f"as gravity turns, the gyroscopes read {reads:.3g} for 1 rad/s: they"
         if fits[0].lsb != 1:
             return (
@@ -133,3 +138,18 @@ class GyroUnitWatch:
             " they are in deg/s, begin again with gyr_unit=deg/s in the device's"
             " address; a turn by 45° will tell"
         )
+
+
+def _taken_for_less(reads: float) -> str:
+    """Notice for rates in rad/s that the address declares to be in a smaller unit.
+
+    `reads` is what they read for 1 rad/s. Empty for any other reading.
+    """
+    for unit, size in SMALLER_UNITS.items():
+        if abs(np.log(max(reads, 1e-9) / size)) < GYR_OUT[1]:
+            return (
+                f"as gravity turns, the gyroscopes read {reads:.3g} for 1 rad/s: they"
+                f" are in rad/s, and are taken for {unit}; end this (q) and begin again"
+                " with gyr_unit=rad/s in the device's address"
+            )
+    return ""

@@ -117,3 +117,20 @@ def test_rates_that_move_where_nothing_is_felt_ask_for_their_unit() -> None:
         assert not wait.notice
         assert not wait.question(float(t[-1])) or t[-1] > 4.9
     assert "if they are in deg/s" in wait.question(20.0) and not wait.question(3.0)
+
+
+class TakenForDegrees(InProcess):
+    """A device whose gyroscopes send rad/s under a driver that was told deg/s."""
+
+    def receive(self, timeout: float) -> Block | None:
+        block = super().receive(timeout)
+        return block and replace(block, gyr=np.deg2rad(block.gyr))
+
+
+def test_a_unit_that_looks_like_rest_is_said_where_it_stays(tmp_path: Path) -> None:
+    """Behind the window as well: what was said of the turn is gone by then."""
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        made = make(recorder, TakenForDegrees(VirtualDevice(seed=3)))
+        made.engine.run(hold_all(TWO_POSITIONS, 10.0))
+    said = [text for text in made.turner.told if "and are taken for deg/s" in text]
+    assert said and made.turner.told[-1] == said[-1]

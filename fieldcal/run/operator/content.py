@@ -104,7 +104,8 @@ class RunContent:
     def sentences(self) -> list[str]:
         """Sentences that must not be missed, and why the run waits."""
         why = alert(self.view) if self.view else ""
-        return [*self._told, *([self._reminder + why] if why else [])]
+        told = [text for text in self._told if text != why]
+        return [*told, *([self._reminder + why] if why else [])]
 
     def position_state(self, i: int) -> str:
         """State of a position: "taken" with its ±, "now", "left out", or empty."""

@@ -16,6 +16,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from fieldcal.core.escaping import escape_line
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, runs_of_true
 from fieldcal.drivers.framing import Mask
@@ -44,6 +45,9 @@ QUATERNION_ERROR = 1e-3
 
 LEAST_LINES = 5
 """Lines that make a guess worth while."""
+
+SHOWN_CHARACTERS = 60
+"""Characters of a line that are shown."""
 
 SEPARATORS = {",": ",", ";": ";", "\t": "tab", " ": "space", "|": "|"}
 CHECKSUM_LINE = re.compile(r"\$?(.*)\*[0-9A-Fa-f]{2}")
@@ -80,6 +84,31 @@ def guess_text_options(data: bytes, seconds: float) -> str | None:
     if separator != ",":
         named.insert(1, f"separator={SEPARATORS[separator]}")
     return "&".join(named + options)
+
+
+def describe_lines(data: bytes) -> str:
+    r"""What lines are of which no format is known, and what to do; empty of no lines.
+
+    >>> describe_lines(b"12;-3;16384\r\n" * 9)[:45]
+    "lines of numbers come, such as '12;-3;16384':"
+    >>> describe_lines(bytes(range(256)))
+    ''
+    """
+    lines = [line.strip() for line in data.decode("latin-1").split("\n")[1:-1]]
+    lines = [line for line in lines if line]
+    plain = sum(line.isascii() and line.isprintable() for line in lines)
+    if len(lines) < LEAST_LINES or plain < 0.8 * len(lines):
+        return ""
+    one = escape_line(lines[len(lines) // 2][:SHOWN_CHARACTERS])
+    if _table(lines):
+        return (
+            f"lines of numbers come, such as '{one}': say what their columns are, as"
+            " in format=text&columns=t,ax,ay,az,gx,gy,gz&acc_unit=g&gyr_unit=deg/s"
+        )
+    return (
+        f"lines of text come, such as '{one}', and format=text reads numbers between"
+        " separators only: set the device to send those"
+    )
 
 
 def _table(lines: list[str]) -> tuple[str, Array] | None:

@@ -197,6 +197,10 @@ class Driver(ABC):
             return "not a byte came; check cable, power and port"
         if now.skipped - before.skipped > (now.received - before.received) / 2:
             return self._garbage()
+        return self._incomplete()
+
+    def _incomplete(self) -> str:
+        """What to say of frames that make no sample."""
         return "frames come, but no whole sample; check what the device is to send"
 
     def drain(self) -> Block:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from math import isfinite
 from urllib.parse import parse_qsl
 
@@ -73,6 +73,28 @@ class Options:
                 f"{self._owner}: {name}={value} is no number from {low:g} to {high:g}"
             )
         return number
+
+    def unit(self, name: str, known: Mapping[str, float], default: str) -> float:
+        """Return the SI value of a unit, also with a factor, as in ``0.061*mg``.
+
+        Raises
+        ------
+        InputError
+            If it is none of `known`, or the factor is no number or 0.
+
+        """
+        value = self.text(name, default)
+        factor, _, unit = value.rpartition("*")
+        try:
+            size = float(factor or 1.0) * known[unit]
+            if not (size and isfinite(size)):
+                raise ValueError
+        except (ValueError, KeyError):
+            raise InputError(
+                f"{self._owner}: {name}={value} is none of {', '.join(known)}, nor one"
+                f" of them with a factor, as in 0.5*{default}"
+            ) from None
+        return size
 
     def with_fixed(self, **values: str) -> Options:
         """Return these options with some that cannot be chosen."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from fieldcal.core.errors import DeviceError
 from fieldcal.drivers.codec import codec_class, recognise_format, wire_formats
+from fieldcal.drivers.column_guess import describe_lines
 from fieldcal.drivers.mavlink_detection import detect_autopilot
 from fieldcal.drivers.reader import ByteSource
 from fieldcal.drivers.serial_imu import open_port
@@ -66,6 +67,7 @@ def probe_port(
 ) -> DetectedDevice:
     """Listen at one baud rate after the other, at most so many seconds each."""
     heard = silent = 0
+    lines = ""
     for baud in baud_rates() if rates is None else rates:
         try:
             data, found = _listen_at(port, baud, seconds)
@@ -73,12 +75,14 @@ def probe_port(
             return DetectedDevice(port, "", "", 0, 0.0, str(fault))
         heard += len(data)
         silent += not data
+        if not lines and (seen := describe_lines(data)):
+            lines = f"at {baud} baud {seen}"
         if silent >= SILENT_RATES and not heard:
             break
         if found:
             return found
     says = (
-        "bytes come, but no format that is known"
+        lines or "bytes come, but no format that is known"
         if heard
         else "nothing comes; is the device powered and sending?"
     )

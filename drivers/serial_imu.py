@@ -18,6 +18,7 @@ from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Block, Grain
 from fieldcal.drivers.clock_comparison import ClockComparison
 from fieldcal.drivers.codec import open_codec, recognise_format
+from fieldcal.drivers.column_guess import describe_lines
 from fieldcal.drivers.driver import Driver
 from fieldcal.drivers.mavlink_detection import detect_autopilot
 from fieldcal.drivers.options import split_address
@@ -152,6 +153,11 @@ class SerialImu(Driver):
         """Release the port; safe to call twice."""
         self._reader.close()
 
+    def _incomplete(self) -> str:
+        data = b"".join(chunk.data for chunk in self._heard)
+        lines = describe_lines(data) if self._format == "text" else ""
+        return lines or super()._incomplete()
+
     def _garbage(self) -> str:
         data = b"".join(chunk.data for chunk in self._heard)
         known = recognise_format(data, self._heard[-1].t_host - self._heard[0].t_host)
@@ -162,7 +168,7 @@ class SerialImu(Driver):
                 f"mavlink:{self.name}?baud={self._baud}{query}"
             )
         if known is None:
-            return (
+            return describe_lines(data) or (
                 "bytes come, but no format that is known; check the baud rate and"
                 f" the port, or ask `fieldcal ports --probe {self.name}`"
             )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import json
 import os
 import shlex
@@ -124,12 +125,26 @@ def _run_guarded(name: str, arguments: list[str]) -> int:
         sys.stderr.close()
         return 0
     except Exception as error:  # the operator gets a sentence whatever it is
-        said, code = _write_crash_file(name, arguments, error), EXIT_INTERNAL_ERROR
+        if full := _output_is_full(error):
+            said, code = full, FieldcalError.exit_code
+        else:
+            said, code = _write_crash_file(name, arguments, error), EXIT_INTERNAL_ERROR
     sys.stderr.write(f"fieldcal {name}: {said}\n")
     if "--json" in arguments and not printed:
-        failed = {"error": said, "exit_code": code}
-        sys.stdout.write(json.dumps(failed, ensure_ascii=False) + "\n")
+        _write_failure(said, code)
     return code
+
+
+def _write_failure(said: str, code: int) -> None:
+    """Write the JSON object of a failed command, if anything can take it."""
+    failed = {"error": said, "exit_code": code}
+    try:
+        sys.stdout.write(json.dumps(failed, ensure_ascii=False) + "\n")
+        sys.stdout.flush()
+    except OSError:
+        from fieldcal.commands.console import discard_output
+
+        discard_output()
 
 
 def _flush_output(code: int) -> int:
@@ -141,6 +156,22 @@ def _flush_output(code: int) -> int:
 
         discard_output()
     return code
+
+
+def _output_is_full(error: Exception) -> str:
+    """Sentence on an output that takes no more; empty for any other error.
+
+    Nothing more is written to it, so that the interpreter does not fail at its end.
+    """
+    full = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    # an error of a named file is one of a file, and no stream's
+    if not isinstance(error, OSError) or error.filename or error.errno not in full:
+        return ""
+    from fieldcal.commands.console import discard_output
+    from fieldcal.core.errors import disk_says
+
+    discard_output()
+    return f"the output cannot be written: {disk_says(error)}"
 
 
 def _write_crash_file(name: str, arguments: list[str], error: Exception) -> str:

@@ -3,7 +3,8 @@
 A line is one sample, its fields in the order of ``columns`` (a name that is none of
 t, seq, ax … gz, temperature is passed over), between ``separator``: a character or
 comma, semicolon, tab, space. Units are ``t_unit`` (s, ms, us, ns), ``acc_unit`` and
-``gyr_unit`` as in session.toml, or mdeg/s. ``checksum=xor`` asks each line for the two
+``gyr_unit`` as in session.toml, or mdeg/s, also with a factor, which is what a count
+is worth: ``acc_unit=0.061*mg``. ``checksum=xor`` asks each line for the two
 hexadecimal digits behind ``*`` that NMEA 0183 has: the exclusive or of all between
 ``$`` and ``*``. ``prefix=IMU`` passes over lines that begin otherwise; a ``$`` is no
 part of it.
@@ -80,8 +81,8 @@ class TextCodec(Codec):
         prefix += chr(self._separator) if prefix else ""
         self._prefix = np.frombuffer(prefix.encode(), np.uint8)
         self._checked = options.choice("checksum", ("none", "xor"), "none") == "xor"
-        acc = ACC_UNITS[options.choice("acc_unit", ACC_UNITS, "m/s^2")]
-        gyr = RATE_UNITS[options.choice("gyr_unit", RATE_UNITS, "rad/s")]
+        acc = options.unit("acc_unit", ACC_UNITS, "m/s^2")
+        gyr = options.unit("gyr_unit", RATE_UNITS, "rad/s")
         self._scale = np.array([acc] * 3 + [gyr] * 3)
         unit = options.choice("t_unit", TIME_UNITS, "s")
         self._t_unit = TIME_UNITS[unit]

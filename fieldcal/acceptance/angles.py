@@ -125,8 +125,8 @@ def unstated_angles_warning(about: Description) -> str:
     return (
         "nobody stated how well the angles are set, and they are taken as set to"
         f" ± {angle_setting(about):g}°, which on so small a ladder is rarely enough for"
-        " GO: state it (--angles 0.01, in degrees, 1σ; fieldcal solve accepts it"
-        " afterwards)"
+        " GO: state it (--angles 0.01, in degrees, 1σ; fieldcal run --resume and"
+        " fieldcal solve accept it afterwards)"
     )
 
 

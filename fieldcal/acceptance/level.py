@@ -46,7 +46,8 @@ def level_missing_warning(about: Description) -> str:
     return (
         "these positions do not show how level the base is, and a tilt of 1° changes a"
         f" bias by {bias:.2f} m/s²: state how level it is (--level 0.01, in degrees,"
-        " 1σ; fieldcal solve accepts it afterwards), or take five positions"
+        " 1σ; fieldcal run --resume and fieldcal solve accept it afterwards), or take"
+        " five positions"
     )
 
 

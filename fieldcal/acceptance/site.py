@@ -29,8 +29,8 @@ def gravity_missing_warning(about: Description) -> str:
     return (
         "the site is not stated, and gravity, to which scale factors refer, is"
         f" {least:.3f} m/s² at the equator and {most:.3f} m/s² at the poles: state it"
-        " (--latitude and --height, or --gravity; afterwards in [site] of session.toml:"
-        " latitude_deg and height_m)"
+        " (--latitude and --height, or --gravity; fieldcal run --resume accepts them"
+        " afterwards, or write latitude_deg and height_m into [site] of session.toml)"
     )
 
 
@@ -41,8 +41,8 @@ def latitude_missing_warning(about: Description) -> str:
     return (
         "the latitude is not stated: gyroscopes of navigation grade are calibrated by"
         f" the Earth's rate, and their biases contain up to {EARTH_RATE:.1e} rad/s of"
-        " it: state it (--latitude; afterwards latitude_deg in [site] of"
-        " session.toml)"
+        " it: state it (--latitude; fieldcal run --resume accepts it afterwards, or"
+        " write latitude_deg into [site] of session.toml)"
     )
 
 

@@ -89,4 +89,7 @@ def _print_ports(ports: list[dict[str, Any]], probed: bool) -> None:
     console.print(table)
     for port in ports:
         if probed and port["answer"]["url"]:
-            console.print(f"to use it: {port['answer']['url']}", markup=False)
+            # in quotation marks: a shell ends a command at an &
+            console.print(
+                f'to use it: --device "{port["answer"]["url"]}"', markup=False
+            )

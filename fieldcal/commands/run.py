@@ -15,7 +15,8 @@ from fieldcal.commands.repeated_option import StoreRepeated
 from fieldcal.commands.run_operator import run_operator
 from fieldcal.commands.run_page import LOCAL, serve_page, show_end_on_page
 from fieldcal.commands.run_results import report_broken_run, write_junit
-from fieldcal.commands.run_task import SESSIONS, make_task
+from fieldcal.commands.run_statements import decide_as_stated, write_statements
+from fieldcal.commands.run_task import SESSIONS, make_room, make_task, session_to_resume
 from fieldcal.commands.run_timeouts import (
     HEADLESS_PATIENCE_S,
     OPERATOR_PATIENCE_S,
@@ -181,6 +182,12 @@ def run(args: argparse.Namespace) -> int:
 def _prepare_and_run(args: argparse.Namespace) -> int:
     if _names_no_device(args):
         find_device(args)
+    if args.resume:
+        folder = session_to_resume(args.resume)
+        if write_statements(args, folder):
+            code = decide_as_stated(args, folder)
+            if code is not None:
+                return code
     task, folder = make_task(args)
     with serve_page(args) as page:
         return _run_and_show(page, args, task, folder)
@@ -265,6 +272,7 @@ def _record_and_solve(
         known = Session.open(folder) if args.resume else None
         taken = recorded_averages(known, task) if known else {}
         if not args.resume:
+            make_room(folder, args.headless)
             refuse_recorded_companions(folder, len(task.further))
         own = stack.enter_context(Recorder(folder, None if known else task.tables))
         args.records = True

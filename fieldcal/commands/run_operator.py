@@ -43,7 +43,7 @@ def run_operator(
         title,
         task.about.positions if most else task.positions,
         mover,
-        EscapingConsole(stderr=args.json),
+        EscapingConsole(stderr=args.json, spelled=False),  # the screen has its own
         args.plain,
         Keyboard(),
         len(task.about.positions) if task.verification and most is None else None,

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import PlanTask
     from fieldcal.session.folder import Session
 
+UNTAKEN = "no position was taken, so the same command may begin again; "
+"""What is said behind a run that broke off before it had anything to keep."""
+
 
 def solve_and_decide(
     session: Session, bounds: GradeLimits, history: History, method: str = "auto"
@@ -125,6 +128,7 @@ def report_broken_run(
 
     A folder of another run is not touched.
     """
+    from fieldcal.run.begun_before import has_taken_position
     from fieldcal.session.marks import MARKS
 
     own = args.resume or args.records
@@ -134,8 +138,9 @@ def report_broken_run(
         write_junit(args.junit, task, folder, None, str(error) or "interrupted")
     if args.resume or not _discard_if_empty(folder, len(task.further)):
         moved = ", with --device if its port is another now (fieldcal ports)"
+        begin = "" if has_taken_position(folder) else UNTAKEN
         sys.stderr.write(
-            f"what was recorded is kept in {folder}; to go on:"
+            f"what was recorded is kept in {folder}; {begin}to go on:"
             f" fieldcal run --resume {shlex.quote(str(folder))}"
             f"{moved if isinstance(error, DeviceError) else ''}\n"
         )

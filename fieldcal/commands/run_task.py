@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import shlex
+import sys
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.run_statements import site_options
 from fieldcal.commands.site import merge_tables, site_tables, tables_of_options
 from fieldcal.core.errors import InputError
 
@@ -57,26 +59,33 @@ def make_task(args: argparse.Namespace) -> tuple[PlanTask, Path]:
     return task, args.output or SESSIONS / f"{stamp}-{task.procedure}"
 
 
+def make_room(folder: Path, headless: bool) -> None:
+    """Move an earlier run that took no position out of a new one's folder."""
+    from fieldcal.run.begun_before import set_untaken_aside
+    from fieldcal.run.operator.script import report_event
+
+    if aside := set_untaken_aside(folder):
+        said = f"an earlier run that took no position is now in {aside}"
+        if headless:
+            report_event("tell", text=said)
+        else:
+            sys.stderr.write(f"{said}\n")
+
+
 def _task_to_resume(args: argparse.Namespace) -> tuple[PlanTask, Path]:
     from fieldcal.run import plan_file
     from fieldcal.run.resuming import open_for_resume
 
     if args.procedure or args.output:
         raise InputError("--resume goes on with what it finds: give it alone")
-    if tables_of_options(args):
-        raise InputError(
-            "--resume goes on with the device and place its session.toml names:"
-            " leave those options out"
-        )
-    session, tables, args.again = open_for_resume(_session_to_resume(args.resume))
+    session, tables, args.again = open_for_resume(session_to_resume(args.resume))
     tables["run"] = {**tables["run"], **_run_options(args)}
-    tables = merge_tables(tables, _site_options(args))
     return plan_file.task_from_tables(
         tables, f"{session.folder}/session.toml"
     ), session.folder
 
 
-def _session_to_resume(folder: Path) -> Path:
+def session_to_resume(folder: Path) -> Path:
     """The session that was named, or the latest one in `SESSIONS`."""
     from fieldcal.session.marks import MARKS
 
@@ -117,13 +126,9 @@ def _site_options(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
     angles = args.angles
     if angles is None and args.virtual is not None and ANGLE_EFFECT not in args.virtual:
         angles = VIRTUAL_SETTING_DEG
-    said = {
-        "level_deg": args.level,
-        "angle_setting_deg": angles,
-        "angles_from": args.angles_from,
-        "sways": args.sways,
-    }
-    site = {key: value for key, value in said.items() if value is not None}
+    site = site_options(args)
+    if angles is not None:
+        site["angle_setting_deg"] = angles
     return {"site": site} if site else {}
 
 

@@ -30,6 +30,16 @@ def spell_unencodable(error: UnicodeError) -> tuple[str, int]:
     return "".join(map(_spell_letter, text)), error.end
 
 
+def spell(text: str, encoding: str) -> str:
+    """Text with replacements for the letters that an encoding does not have.
+
+    >>> spell("± 1σ", "cp1252"), spell("± 1σ", "utf-8")
+    ('± 1sigma', '± 1σ')
+    """
+    codecs.register_error(ERROR_HANDLER, spell_unencodable)
+    return text.encode(encoding, ERROR_HANDLER).decode(encoding)
+
+
 def _spell_letter(letter: str) -> str:
     if letter in SPELLINGS:
         return SPELLINGS[letter]

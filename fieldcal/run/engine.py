@@ -25,7 +25,12 @@ from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Add, Hold, Judge, Note, Plan, Repeat, Step
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.incoming import SILENCES_UNTIL_TOLD, IncomingSamples
-from fieldcal.run.interruptions import WindowDisturbed, kept_notice, restart_notice
+from fieldcal.run.interruptions import (
+    WindowDisturbed,
+    is_motion,
+    kept_notice,
+    restart_notice,
+)
 from fieldcal.run.link_marks import MarkedRecorder
 from fieldcal.run.operator.desk import (
     OperatorDesk,
@@ -99,9 +104,9 @@ class Engine:
         self._before: int | None = None
         self._restarts = driver.health.restarts
         self._units = GyroUnitWatch(about.gravity)
-        self._warned_of_unit = False
+        self._warned_of_unit: int | None = None
         self._desk = OperatorDesk(operator, recorder)
-        self._display = Display(operator, driver)
+        self._display = Display(operator, driver, self._left_out)
         self._incoming = IncomingSamples(
             driver, recorder, self._on_samples, self._on_piece
         )
@@ -204,7 +209,7 @@ class Engine:
             except Moved as moved:
                 if self._give_up is not None:
                     raise
-                tries += 1
+                tries += is_motion(moved)
                 self._desk.tell(restart_notice(moved, tries))
                 continue
             if average is not None:
@@ -225,6 +230,8 @@ class Engine:
                 average = self._windows.average(hold, pieces)
                 if average is not None:
                     self._warn_if_warming_up()
+                    self._warned_of_unit = None  # what was said of a turn is gone
+                    self._warn_of_unit(hold)
                 return average
             except WindowDisturbed as disturbed:
                 moved, kept = disturbed.moved, disturbed.kept
@@ -289,7 +296,7 @@ class Engine:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.notice)
             self._display.show_turning(hold, waiting, reason)
             shown = reason.state
-            self._warn_of_unit()
+            self._warn_of_unit(hold)
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
                 self._desk.alarm(reason)
@@ -298,11 +305,11 @@ class Engine:
             self._report_wrong_place(hold, waiting, quiet=wish == "wait")
         raise AssertionError("blocks() ends in an exception only")
 
-    def _warn_of_unit(self) -> None:
-        """Say once that the gyroscopes are in another unit."""
-        if self._units.notice and not self._warned_of_unit:
-            self._warned_of_unit = True
-            self._desk.alarm(WaitReason(WaitState.WRONG_UNIT, self._units.notice))
+    def _warn_of_unit(self, hold: Hold) -> None:
+        """Say once a position that the gyroscopes are in another unit."""
+        if self._units.notice and self._warned_of_unit != hold.index:
+            self._warned_of_unit = hold.index
+            self._desk.tell(self._units.notice)
 
     def _report_wrong_place(
         self, hold: Hold, waiting: PositionWait, quiet: bool

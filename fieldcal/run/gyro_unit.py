@@ -36,6 +36,9 @@ turn is enough than in an unknown recording."""
 HINT_AFTER_S = 5.0
 """Rest by the accelerometers alone after which changing rates are reported, s."""
 
+SMALLER_UNITS = {"deg/s": np.pi / 180, "mrad/s": 1e-3}
+"""Units that an address may state in place of rad/s, in rad/s."""
+
 
 class GyroUnitWatch:
     """Determines the unit of the angular rates from samples as they arrive.
@@ -85,31 +88,47 @@ class GyroUnitWatch:
         fits = fitting_scales(reads, GYR_SCALES, GYR_OUT[1])
         self.unit = fits[0].unit if fits and fits[0].lsb == 1 else ""
         self._proved = bool(fits) and fits[0].unit == "rad/s"
-        if not fits or self._proved:
+        if self._proved:
             return ""
+        if not fits:
+            return _taken_for_less(reads)
         said = f"as gravity turns, the gyroscopes read {reads:.3g} for 1 rad/s: they"
         if fits[0].lsb != 1:
             return (
                 f"{said} send {fits[0]}, and are taken for rad/s; end this (q), and say"
-                " their range in the device's address"
+                " so in the device's address: the range, or where it takes units"
+                f" gyr_unit={1 / fits[0].lsb:.6g}*{fits[0].unit}"
             )
         return (
             f"{said} are in {fits[0].unit} and not in rad/s; end this (q) and begin"
             f" again with gyr_unit={fits[0].unit} in the device's address"
         )
 
+    def _last_means(self, moving: float) -> Array:
+        """Means (n, 7) of the time in which it did not come to rest; none of less."""
+        count = int(HINT_AFTER_S / MEAN_S)
+        enough = moving >= HINT_AFTER_S and len(self._means) >= count
+        return np.array(self._means)[-count:] if enough else np.zeros((0, 7))
+
+    def steady_norm(self, moving: float) -> float:
+        """Length of a force that is steady, though not at rest for `moving` s, m/s^2.
+
+        Steady in parts of its own length, whatever unit that is in; nan if it is not.
+        """
+        acc = self._last_means(moving)[:, 1:4]
+        if not len(acc):
+            return float("nan")
+        norm = float(np.linalg.norm(acc.mean(axis=0)))
+        steady = (acc.std(axis=0) < ACC_REST_SCATTER / self._gravity.size * norm).all()
+        return norm if steady else float("nan")
+
     def question(self, moving: float) -> str:
         """Question about the unit if the device has not come to rest for `moving` s.
 
         Empty unless it rests by its accelerometers, and no turn has shown the unit.
         """
-        lately = np.array(self._means)[-int(HINT_AFTER_S / MEAN_S) :]
-        if (
-            self.notice
-            or self._proved
-            or moving < HINT_AFTER_S
-            or len(lately) < HINT_AFTER_S / MEAN_S
-        ):
+        lately = self._last_means(moving)
+        if self.notice or self._proved or not len(lately):
             return ""
         if not (lately[:, 1:4].std(axis=0) < ACC_REST_SCATTER).all():
             return ""
@@ -119,3 +138,18 @@ class GyroUnitWatch:
             " they are in deg/s, begin again with gyr_unit=deg/s in the device's"
             " address; a turn by 45° will tell"
         )
+
+
+def _taken_for_less(reads: float) -> str:
+    """Notice for rates in rad/s that the address declares to be in a smaller unit.
+
+    `reads` is what they read for 1 rad/s. Empty for any other reading.
+    """
+    for unit, size in SMALLER_UNITS.items():
+        if abs(np.log(max(reads, 1e-9) / size)) < GYR_OUT[1]:
+            return (
+                f"as gravity turns, the gyroscopes read {reads:.3g} for 1 rad/s: they"
+                f" are in rad/s, and are taken for {unit}; end this (q) and begin again"
+                " with gyr_unit=rad/s in the device's address"
+            )
+    return ""

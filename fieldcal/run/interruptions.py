@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fieldcal.core.errors import Moved
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import CHANNELS, Block
 from fieldcal.drivers.driver import Driver
 
 
@@ -56,10 +56,18 @@ REMEDY_FROM = 3
 """Number of disturbed windows in a position from which the notice states a remedy."""
 
 
+def is_motion(moved: Moved) -> bool:
+    """Whether a window was interrupted by motion, and not by the link or a restart."""
+    return moved.axis in CHANNELS
+
+
 def restart_notice(moved: Moved, times: int) -> str:
-    """Sentence about a window that was disturbed for the n-th time, n = `times`."""
+    """Sentence about a window that begins again.
+
+    `times` is how often a window in this position was disturbed by motion.
+    """
     said = f"{moved}; hold still, the window starts again"
-    if times < REMEDY_FROM:
+    if times < REMEDY_FROM or not is_motion(moved):
         return said
     return (
         f"{said}, disturbed {times} times now: fix the device better, or shelter it"

@@ -14,9 +14,9 @@ import numpy as np
 
 from fieldcal.core.frames import specific_force_at_home
 from fieldcal.core.samples import Array, Block, split_by_time
+from fieldcal.run.acc_unit import reads_gravity
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.mounting_check import fitting_mounting, up_axis
-from fieldcal.run.position_check import NORM
 
 PLAIN_MOUNTING = ("+x", "+y", "+z")
 """The mounting unless another is declared."""
@@ -69,7 +69,7 @@ def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
         return DeviceIntroduction("", PLAIN_MOUNTING, centred, summary + zero)
     f: Array = np.nanmean(block.acc, axis=0)
     size = float(np.linalg.norm(f))
-    if not abs(size - gravity) <= NORM * gravity:
+    if not reads_gravity(size, gravity):
         summary = f"it reads {size:.3g} m/s² at rest, and gravity is {gravity:.3g} m/s²"
         return DeviceIntroduction("", PLAIN_MOUNTING, centred, summary + zero)
     mounting = fitting_mounting(f, specific_force_at_home(gravity), PLAIN_MOUNTING)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, Self
 
-from fieldcal.core.errors import DeviceError, MoverGone
+from fieldcal.core.errors import DeviceError, InputError, MoverGone
 from fieldcal.core.positions import Position
 from fieldcal.sim_device.remote import RemoteDevice
 
@@ -119,6 +119,8 @@ class VirtualMover(RunningDevice):
     ------
     DeviceError
         If it does not start, or does not answer.
+    InputError
+        If it refuses the options.
 
     """
 
@@ -149,7 +151,10 @@ class VirtualMover(RunningDevice):
         if not line:
             _, said = self._process.communicate()
             last = said.strip().splitlines()[-1:] or ["it said nothing"]
-            raise DeviceError(f"the virtual device did not start: {last[0]}")
+            # options that it refuses are the user's, and no fault of a device
+            refused = self._process.returncode == InputError.exit_code
+            fault = InputError if refused else DeviceError
+            raise fault(f"the virtual device did not start: {last[0]}")
         return line
 
     @property

@@ -23,15 +23,13 @@ import numpy as np
 from fieldcal.core.frames import angles_of_force_direction, in_axes_turned_about_y
 from fieldcal.core.positions import Position, specific_forces
 from fieldcal.core.samples import Array
+from fieldcal.run.acc_unit import acc_unit_message, reads_gravity
 
 FIRST_TOLERANCE_RAD = np.deg2rad(8.0)
 """Tolerance for the first position, rad: base tilt and bias of a raw device."""
 
 JOINT_TOLERANCE_RAD, TILT_TOLERANCE_RAD = np.deg2rad(1.0), np.deg2rad(3.5)
 """Tolerance for later positions, rad: of the joints, of the base for a unit turn."""
-
-NORM = 0.15
-"""Relative deviation of the norm from g beyond which unit or scale must be wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +67,7 @@ def check_position(
     gravity: float,
     held: AcceptedPosition | None,
     others: Mapping[str, Position] | None = None,
+    address: str = "",
 ) -> PositionCheck:
     """Compare measured force with a position asked for.
 
@@ -79,6 +78,7 @@ def check_position(
     gravity : m/s^2
     held : an earlier position, or None before the first
     others : further places it might be in instead, by what is then said of it
+    address : of the device, whose options state a unit
 
     """
     norm = float(np.linalg.norm(f))
@@ -93,11 +93,8 @@ def check_position(
     )
     alpha, beta = np.rad2deg(angles_of_force_direction(upright))
     seen = (float(alpha), float(beta))
-    if abs(norm - gravity) > NORM * gravity:
-        problem = (
-            f"the accelerometers read {norm:.2f} m/s² in all, gravity is"
-            f" {gravity:.2f} m/s²: check unit, range and wire format"
-        )
+    if not reads_gravity(norm, gravity):
+        problem = acc_unit_message(norm, gravity, address)
         return PositionCheck(False, *seen, problem)
     if not wanted.oriented:
         return PositionCheck(True, *seen)

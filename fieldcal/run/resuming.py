@@ -65,7 +65,7 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
             f"{folder}: is the session of a further device of a run: go on with that"
             f" one, --resume {folder.absolute().parent}"
         )
-    if _is_finished(marks) and _has_result(folder, marks):
+    if is_decided(session):
         remedy = _remedy(folder, session)
         again = tuple(int(i) for i in remedy["again"])
         last = len(session.positions)
@@ -104,6 +104,12 @@ def _planned_count(marks: Sequence[Mapping[str, Any]], session: Session) -> int:
     """Number of positions that a session was begun with."""
     added = sum(bool(mark.get("event") == POSITION_ADDED) for mark in marks)
     return len(session.about.positions) - added
+
+
+def is_decided(session: Session) -> bool:
+    """Whether the last run of a session came to its result."""
+    marks = list(session.marks())
+    return _is_finished(marks) and _has_result(session.folder, marks)
 
 
 def _is_finished(marks: Sequence[Mapping[str, Any]]) -> bool:

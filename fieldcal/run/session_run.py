@@ -7,9 +7,10 @@ run is resumed in the same way after a second and after a reboot.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from time import monotonic, sleep
+from typing import Any
 
 from fieldcal import procedures
 from fieldcal.acceptance.verification import planned_verification
@@ -195,7 +196,7 @@ class SessionRun:
         while self._remedies < MOST_REMEDIES:
             so_far: InterimResult = yield Judge()
             remedy = so_far.remedy
-            if remedy is None:
+            if remedy is None or self._was_left_out(remedy["positions"]):
                 return
             self._remedies += 1
             yield from note(f"NO-GO so far: {so_far.reasons[0]}; {remedy['says']}")
@@ -210,6 +211,13 @@ class SessionRun:
                 except Skipped as skipped:
                     yield from note(str(skipped))
                     return
+
+    def _was_left_out(self, places: Sequence[Mapping[str, Any]]) -> bool:
+        """Whether the operator left out one of these places, by whatever number."""
+        known = with_added_positions(self._task.about, self._added).positions
+        out = {known[i].degrees for i in self._left_out if i < len(known)}
+        wanted = {Position.deg(p["alpha_deg"], p["beta_deg"]).degrees for p in places}
+        return bool(wanted & out)
 
     def _wait_for_device(self, lost: DeviceError, deadline: float) -> Driver:
         """Open the device again, or raise the error by which it was lost."""

@@ -14,12 +14,12 @@ from fieldcal.core.positions import Position, specific_forces
 from fieldcal.core.samples import CHANNELS, Array, Block, concat
 from fieldcal.core.sentences import join_words
 from fieldcal.planning.steps import Hold
+from fieldcal.run.acc_unit import acc_unit_message, reads_gravity
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import MAX_GAP_S
 from fieldcal.run.mounting_check import wrong_mounting_message
 from fieldcal.run.position_check import (
     JOINT_TOLERANCE_RAD,
-    NORM,
     AcceptedPosition,
     PositionCheck,
     check_position,
@@ -84,6 +84,7 @@ class PositionWait:
         self._hold, self._about = hold, about
         self._previous, self._interrupted = previous, interrupted
         self._units = units
+        self._address = str(about.raw.get("run", {}).get("device", ""))
         self._others = _other_positions(hold, about)
         self._began: float | None = None
         self._first: Array | None = None
@@ -168,7 +169,7 @@ class PositionWait:
 
     def _check_position(self, f: Array) -> PositionCheck:
         wanted, g = self._hold.position, self._about.gravity
-        return check_position(wanted, f, g, self._previous, self._others)
+        return check_position(wanted, f, g, self._previous, self._others, self._address)
 
     @property
     def arrived(self) -> bool:
@@ -182,15 +183,13 @@ class PositionWait:
         """Whether the operator may insist on the position: at rest, about gravity."""
         if self.f is None or self.seconds < SETTLE_S:
             return False
-        off = abs(float(np.linalg.norm(self.f)) - self._about.gravity)
-        return off <= NORM * self._about.gravity
+        return reads_gravity(float(np.linalg.norm(self.f)), self._about.gravity)
 
     @property
     def reason(self) -> WaitReason:
         """The present reason for waiting."""
         if self._stillness.since is None:
-            units, moving = self._units, self._last - self._stirred
-            if wrong := units and (units.notice or units.question(moving)):
+            if wrong := self._wrong_unit():
                 return WaitReason(WaitState.WRONG_UNIT, wrong)
             measured = np.isfinite(self.meter)
             return WaitReason(WaitState.MOVING if measured else WaitState.LISTENING)
@@ -199,6 +198,16 @@ class PositionWait:
                 return WaitReason(WaitState.TURNING)
             return WaitReason(WaitState.MISPLACED, self.problem)
         return WaitReason(WaitState.SETTLING)
+
+    def _wrong_unit(self) -> str:
+        """What shows a wrong unit while the device does not come to rest by it."""
+        units, moving = self._units, self._last - self._stirred
+        if units is None or units.notice:
+            return units.notice if units else ""
+        said, norm, g = [], units.steady_norm(moving), self._about.gravity
+        if np.isfinite(norm) and not reads_gravity(norm, g):
+            said.append(acc_unit_message(norm, g, self._address))
+        return "; ".join(filter(None, [*said, units.question(moving)]))
 
     @property
     def problem(self) -> str:

@@ -11,8 +11,12 @@ from pathlib import Path
 
 import pytest
 from bench import five_positions
+from rich.table import Table
+from rich.text import Text
 
 from fieldcal.commands import spelling
+from fieldcal.commands.console import EscapingConsole
+from fieldcal.commands.table import print_sentence
 from fieldcal.run.operator.keyboard import WindowsKeys
 
 BARE = """
@@ -140,3 +144,22 @@ def test_letters_that_a_terminal_lacks_are_spelled(
     assert plain.buffer.getvalue() == (
         b"alpha = 22.5 deg +- 0.1 deg -> beta, chi^2 <= 3 sigma +-+ #"
     )
+
+
+def test_tables_and_lines_fit_in_letters_that_are_spelled_out() -> None:
+    """A letter is measured as what is shown in its place: sigma is five wide."""
+    out = io.TextIOWrapper(io.BytesIO(), encoding="cp1252", newline="\n")
+    console = EscapingConsole(
+        file=out, width=60, force_terminal=True, color_system=None
+    )
+    table = Table("parameter", "± 1σ", "σ")
+    table.add_row("x", "0.1", Text.assemble("σ of ", ("α", "red")))
+    console.print(table)
+    print_sentence(console, "?   ", "each is known to 1σ, " * 9)
+    out.flush()
+    assert isinstance(out.buffer, io.BytesIO)
+    lines = out.buffer.getvalue().decode("cp1252").splitlines()
+    rows = [line.rstrip() for line in lines if line.startswith(("+", "|"))]
+    assert len({len(row) for row in rows}) == 1 and "± 1sigma" in rows[1]
+    assert "| sigma " in rows[3] and any("| alpha " in row for row in rows)
+    assert max(map(len, lines)) <= 60 and "" not in lines

@@ -140,8 +140,33 @@ def test_the_table_says_how_to_use_it(capsys: pytest.CaptureFixture[str]) -> Non
     with talking(sample("witmotion")) as port:
         assert main(["ports", "--probe", "--seconds", "0.5", port]) == 0
         shown = capsys.readouterr()
-        assert f"to use it: serial:{port}?format=witmotion&baud=" in shown.out
+        assert f'to use it: --device "serial:{port}?format=witmotion&baud=' in shown.out
         assert "listening" in shown.err
+
+
+def test_lines_that_nobody_knows_are_shown_with_what_to_do() -> None:
+    """Raw counts, whose unit gravity at rest does not tell, and lines with labels."""
+
+    def counts(i: int) -> bytes:
+        return b"%d;%d;0;-16700;40;2;-3;1\r\n" % (10 * i, 12 + i % 2)
+
+    def labels(i: int) -> bytes:
+        return b"ax=0.12 ay=-9.79 az=%d.5\r\n" % (i % 2)
+
+    with talking(counts) as port:
+        says = probe_port(port, 0.3).says
+        assert re.search(
+            r"at \d+ baud lines of numbers come, such as '\d+;1[23];0;", says
+        )
+        assert "format=text&columns=" in says
+        with open_driver(f"serial:{port}?format=witmotion") as imu:
+            with pytest.raises(DeviceSilent, match="lines of numbers come, such as"):
+                next(imu.blocks(0.3))
+    with talking(labels) as port:
+        assert "reads numbers between separators only" in probe_port(port, 0.3).says
+        with open_driver(f"serial:{port}?format=text") as imu:
+            with pytest.raises(DeviceSilent, match=r"such as 'ax=0.12 ay=-9.79 az="):
+                next(imu.blocks(0.3))
 
 
 def test_silence_and_noise_and_no_port(capsys: pytest.CaptureFixture[str]) -> None:

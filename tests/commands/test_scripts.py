@@ -42,6 +42,27 @@ def test_a_reader_that_goes_changes_no_exit_code(
     assert "method: five_position" in shown.out and not shown.err
 
 
+FULL = Path("/dev/full")
+"""An output that takes nothing, as a file on a disk that is full."""
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="this system has no full device")
+@pytest.mark.parametrize("also", ["", "nowhere"])
+def test_a_full_output_is_said_and_no_fault_of_the_program(
+    session: Path, also: str
+) -> None:
+    """A result that cannot be written, and the object of a failure that cannot."""
+    place = session / also
+    with FULL.open("w") as full:
+        call = [*FIELDCAL, "solve", str(place), "--as-printed", "--json"]
+        ended = subprocess.run(
+            call, stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert ended.returncode == 2
+    assert "Traceback" not in ended.stderr and "broke on" not in ended.stderr
+    assert also or "the output cannot be written: the disk is full" in ended.stderr
+
+
 @pytest.mark.parametrize("command", ["solve", "diagnose"])
 def test_a_failure_is_an_object_too(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

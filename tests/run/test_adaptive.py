@@ -293,6 +293,20 @@ def test_who_leaves_out_what_a_remedy_wants_again_is_asked_for_nothing_more(
 THREE = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
 
 
+def test_a_place_that_was_left_out_is_not_asked_for_as_a_remedy(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As behind --resume, where a remedy is a position of the plan by then."""
+    place = {"alpha_deg": 22.5, "beta_deg": 5.0}
+    remedy = {"says": "one more", "again": [], "positions": [place], "seconds": 5.0}
+    judged = SimpleNamespace(incremental=False, reasons=("not known",), remedy=remedy)
+    monkeypatch.setattr(session_run, "judge_session", lambda *_: judged)
+    bench.hand.wants = {2: "skip"}
+    run = {"procedure": "positions", "seconds": 5.0}
+    bench.run(run, until_go=True, position=THREE)
+    assert bench.numbers == [0, 1, 2]
+
+
 def test_what_was_left_out_is_not_asked_for_again_after_a_repetition(
     bench: Bench,
 ) -> None:

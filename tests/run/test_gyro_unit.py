@@ -56,6 +56,27 @@ def test_gyroscopes_in_degrees_are_told_by_a_turn(scale: float, wrong: bool) -> 
 
 
 @pytest.mark.parametrize(
+    ("scale", "taken"),
+    [(np.pi / 180, "deg/s"), (1e-3, "mrad/s"), (0.2, ""), (0.0, "")],
+)
+def test_rates_that_are_taken_for_a_smaller_unit_are_told_by_a_turn(
+    scale: float, taken: str
+) -> None:
+    """They look like rest, so that without this only the end would tell."""
+    units, rng = GyroUnitWatch(9.81), np.random.default_rng(7)
+    t = np.arange(1400) / 100
+    angle = np.deg2rad(45.0) * np.clip((t - 6.0) / 3.0, 0.0, 1.0)
+    acc = 9.81 * np.column_stack([0 * t, -np.cos(angle), np.sin(angle)])
+    gyr = np.column_stack([np.gradient(angle, t), 0 * t, 0 * t])
+    gyr += 2e-3 * rng.standard_normal((1400, 3))
+    block = Block.of(t, acc + 0.02 * rng.standard_normal((1400, 3)), scale * gyr)
+    for piece in split_by_time(block, 0.1):
+        units.add(piece)
+    said = f"they are in rad/s, and are taken for {taken};" if taken else ""
+    assert said in units.notice and bool(units.notice) == bool(taken)
+
+
+@pytest.mark.parametrize(
     ("scale", "unit"), [(np.rad2deg(1.0), "deg/s"), (1.0, "rad/s")]
 )
 @pytest.mark.parametrize("seconds", [1.5, 4.0, 8.0])
@@ -96,3 +117,20 @@ def test_rates_that_move_where_nothing_is_felt_ask_for_their_unit() -> None:
         assert not wait.notice
         assert not wait.question(float(t[-1])) or t[-1] > 4.9
     assert "if they are in deg/s" in wait.question(20.0) and not wait.question(3.0)
+
+
+class TakenForDegrees(InProcess):
+    """A device whose gyroscopes send rad/s under a driver that was told deg/s."""
+
+    def receive(self, timeout: float) -> Block | None:
+        block = super().receive(timeout)
+        return block and replace(block, gyr=np.deg2rad(block.gyr))
+
+
+def test_a_unit_that_looks_like_rest_is_said_where_it_stays(tmp_path: Path) -> None:
+    """Behind the window as well: what was said of the turn is gone by then."""
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        made = make(recorder, TakenForDegrees(VirtualDevice(seed=3)))
+        made.engine.run(hold_all(TWO_POSITIONS, 10.0))
+    said = [text for text in made.turner.told if "and are taken for deg/s" in text]
+    assert said and made.turner.told[-1] == said[-1]

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from processes import HANGS, script
 
-from fieldcal.core.errors import MoverFailed, MoverGone, PlanError
+from fieldcal.core.errors import InputError, MoverFailed, MoverGone, PlanError
 from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.run import retrying_mover
 from fieldcal.run.command_mover import CommandMover
-from fieldcal.run.movers import RunningDevice
+from fieldcal.run.movers import RunningDevice, VirtualMover
 from fieldcal.run.retrying_mover import RetryingMover
 from fieldcal.sim_device.control import Control
 
@@ -209,3 +209,9 @@ def test_a_virtual_device_that_listens_again_is_turned_again(tmp_path: Path) -> 
     device.close()
     again.close()
     assert len(turns) == 2
+
+
+def test_options_that_a_virtual_device_refuses_are_wrong_usage() -> None:
+    """Exit code 2 as of `fieldcal sim` itself: no device has failed."""
+    with pytest.raises(InputError, match="--speed 'abc' must be a number above 0"):
+        VirtualMover(["--speed", "abc"])

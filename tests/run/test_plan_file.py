@@ -22,7 +22,7 @@ from fieldcal import procedures
 from fieldcal.cli import main
 from fieldcal.commands.run import add_arguments
 from fieldcal.commands.run_task import make_task
-from fieldcal.core.errors import InputError, PlanError
+from fieldcal.core.errors import PlanError
 from fieldcal.run import plan_file
 from fieldcal.run.command_mover import CommandMover
 from fieldcal.run.movers import VirtualMover
@@ -252,8 +252,6 @@ def test_what_options_say_goes_over_the_plan(tmp_path: Path) -> None:
     assert task.further == {"can:1": "B1", "can:2": ""}
     about = make_task(parsed(str(path)))[0].about
     assert about.latitude_deg == 50.0 and about.level_deg is None
-    with pytest.raises(InputError, match="leave those options out"):
-        make_task(parsed("--resume", str(tmp_path), "--latitude", "60"))
 
 
 def test_the_plan_of_the_readme_is_one() -> None:

@@ -229,4 +229,20 @@ def test_on_a_small_screen_the_present_reason_outlives_what_was_said() -> None:
     lines = screen(operator, 40, 15).splitlines()
     text = " ".join(" ".join(lines).split())
     assert "the result is NO-GO" in text and "now 2" in text and "q stop" in lines[-1]
-    assert "536.28" not in text
+    assert "check the cableno samples ..." in text  # of the oldest what has room
+
+
+def test_of_what_does_not_fit_the_beginning_is_seen() -> None:
+    """A NO-GO and what it asks for, which is why there is one position more."""
+    operator = sized(40, 15)
+    operator.tell(
+        "NO-GO so far: acc_bias y is known to ± 0.026 m/s², more than 0.02 m/s²; "
+        + "2 positions more for 31 s, α = -45°, β = -5° and α = 45°, β = -5°: " * 5
+    )
+    operator.show(view("turning"))
+    lines = [line.rstrip() for line in screen(operator, 40, 15).splitlines()]
+    said = " ".join(lines)
+    assert "! NO-GO so far: acc_bias y is known" in said and "2 positions more" in said
+    end = lines.index("! the device is at α = 3.0°")
+    assert lines[end - 1].endswith(" ...") and lines[end + 1].startswith("now 2")
+    assert "q stop" in lines[-1] and len(lines) == 15

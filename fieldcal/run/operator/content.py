@@ -80,6 +80,11 @@ class RunContent:
         self.view = view
 
     @property
+    def left_out(self) -> frozenset[int]:
+        """Numbers of the positions that the operator left out."""
+        return self.view.left_out if self.view else frozenset()
+
+    @property
     def phase(self) -> str:
         """Phase of the engine; empty before the first view."""
         return self.view.phase if self.view else ""
@@ -99,11 +104,13 @@ class RunContent:
     def sentences(self) -> list[str]:
         """Sentences that must not be missed, and why the run waits."""
         why = alert(self.view) if self.view else ""
-        return [*self._told, *([self._reminder + why] if why else [])]
+        told = [text for text in self._told if text != why]
+        return [*told, *([self._reminder + why] if why else [])]
 
     def position_state(self, i: int) -> str:
-        """State of a position: "taken" with its ±, "now", or empty."""
+        """State of a position: "taken" with its ±, "now", "left out", or empty."""
         if i not in self.taken:
-            return "now" if i == self.current_index else ""
+            waits = "left out" if i in self.left_out else ""
+            return "now" if i == self.current_index else waits
         sigma = self.taken[i]
         return f"taken   ± {1e3 * sigma:.2f} mm/s²" if np.isfinite(sigma) else "taken"

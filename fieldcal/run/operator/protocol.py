@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -43,6 +44,7 @@ class OperatorView:
     rate_hz : samples a second of device time
     temperature : deg C, nan where unknown
     health : of the link
+    left_out : numbers of the positions that the operator left out
 
     """
 
@@ -56,6 +58,7 @@ class OperatorView:
     rate_hz: float
     temperature: float
     health: LinkHealth
+    left_out: frozenset[int] = frozenset()
 
 
 class Operator(Protocol):
@@ -87,11 +90,14 @@ class Display:
     ----------
     operator : who sees it
     driver : the device, whose health is shown
+    left_out : numbers of the positions that were left out, which may change
 
     """
 
-    def __init__(self, operator: Operator, driver: Driver) -> None:
-        self._operator, self._driver = operator, driver
+    def __init__(
+        self, operator: Operator, driver: Driver, left_out: Set[int] = frozenset()
+    ) -> None:
+        self._operator, self._driver, self._left_out = operator, driver, left_out
         self._rate = self._temperature = np.nan
 
     def note_samples(self, block: Block) -> None:
@@ -135,7 +141,8 @@ class Display:
         reason: WaitReason = NOTHING,
     ) -> None:
         link = (self._rate, self._temperature, self._driver.health)
+        out = frozenset(self._left_out)
         view = OperatorView(
-            phase, hold, arrival, stillness, elapsed, sigma, reason, *link
+            phase, hold, arrival, stillness, elapsed, sigma, reason, *link, out
         )
         self._operator.show(view)

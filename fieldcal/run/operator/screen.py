@@ -27,6 +27,9 @@ TALL = 32
 SMALL_SCREEN = (76, 22)
 """Columns and lines below which only instruction, reason, time and keys are shown."""
 
+CUT_OFF = " ..."
+"""What stands behind the part of a sentence for which there is room."""
+
 COLUMNS_BETWEEN = 3
 """Columns between the list and the picture of the box."""
 
@@ -119,7 +122,8 @@ class Screen:
         if view and hold is view.hold:
             lines += [Text(line) for line in widgets.short_gauges(view)]
         content, count = self._content, len(self._content.positions)
-        taken = Text(widgets.progress(content.taken, content.current_index, count))
+        now, out = content.current_index, content.left_out
+        taken = Text(widgets.progress(content.taken, now, count, out))
         room = self._console.height - 1 - len(self._console.render_lines(
             Group(*lines, taken)))  # fmt: skip
         lines += [*self._sentences(room), taken]
@@ -130,13 +134,26 @@ class Screen:
         return parts
 
     def _sentences(self, room: float = np.inf) -> list[RenderableType]:
-        """The last sentences, and the reason for waiting, in a limited height."""
-        said = [
-            Text(f"! {text}", style="bold yellow") for text in self._content.sentences
-        ]
-        while len(said) > 1 and len(self._console.render_lines(Group(*said))) > room:
-            said.pop(0)
-        return [*said]
+        """The last sentences, and the reason for waiting, in a limited height.
+
+        The last one matters most; of those before it as much is shown as has room.
+        """
+        shown: list[RenderableType] = []
+        width = self._console.width
+        for text in reversed(self._content.sentences):
+            said = Text(f"! {text}", style="bold yellow")
+            rows = said.wrap(self._console, width)
+            if room < 1:
+                break
+            if len(rows) > room:
+                kept = list(rows)[: int(room)]
+                kept[-1].rstrip()
+                kept[-1].truncate(width - len(CUT_OFF))
+                kept[-1].append(CUT_OFF)
+                said = Text("\n").join(kept)
+            shown.insert(0, said)
+            room -= len(rows)
+        return shown
 
     def _listing(self, rows: int) -> RenderableType:
         """The positions around the present one, with what was reached in each."""

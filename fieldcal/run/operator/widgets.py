@@ -5,7 +5,7 @@ All of it reads without colour, and fits into 76 columns.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 
 import numpy as np
 from rich.table import Table
@@ -147,17 +147,28 @@ def gauges(view: OperatorView) -> Table:
     return grid
 
 
-def progress(taken: Mapping[int, float], now: int, number: int) -> str:
-    """Line with the positions that are taken and that are left.
+def progress(
+    taken: Mapping[int, float],
+    now: int,
+    number: int,
+    left_out: Set[int] = frozenset(),
+) -> str:
+    """Line with the positions that are taken, left out, and still to come.
 
-    >>> progress({0: 1e-3, 1: 1e-3}, 2, 5)
-    'taken 1 2 · now 3 · left 4 5'
+    >>> progress({0: 1e-3}, 2, 5, {1})
+    'taken 1 · left out 2 · now 3 · to come 4 5'
     """
-    left = [i for i in range(number) if i not in taken and i != now]
-    parts = [f"taken {' '.join(str(i + 1) for i in sorted(taken))}"] if taken else []
-    parts += [f"now {now + 1}"] if now >= 0 else []
-    parts += [f"left {' '.join(str(i + 1) for i in left)}"] if left else []
-    return " · ".join(parts)
+    waiting = [i for i in range(number) if i not in taken and i != now]
+    groups = {
+        "taken": sorted(taken),
+        "left out": [i for i in waiting if i in left_out],
+        "now": [now] if now >= 0 else [],
+        "to come": [i for i in waiting if i not in left_out],
+    }
+    numbers = {
+        name: " ".join(str(i + 1) for i in each) for name, each in groups.items()
+    }
+    return " · ".join(f"{name} {listed}" for name, listed in numbers.items() if listed)
 
 
 def short_gauges(view: OperatorView) -> list[str]:

@@ -110,8 +110,9 @@ class Board:
                 "wanted": _angles(run.hold.position) if run.hold else None,
             }
             if self._ended is not None:
-                for i in set(range(len(run.positions))) - set(run.taken):
-                    out["positions"][i]["state"] = ""  # no position is the one now
+                for shown in out["positions"]:
+                    if shown["state"] == "now":
+                        shown["state"] = ""  # no position is the one now
                 return out | self._ended | {"now": None}
             if run.view is not None and run.view.hold is run.hold:
                 out |= _measured(run.view)

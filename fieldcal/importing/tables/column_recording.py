@@ -33,6 +33,7 @@ from fieldcal.importing.recording import (
 )
 from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, column_numbers
+from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
 from fieldcal.importing.tables.means import scatter_columns
@@ -148,7 +149,8 @@ class ColumnRecording(Recording):
         way = next((w for found, w in ways if found and found is named), None)
         thermometer = bool(named) and not _channels(named[0]) & {"ax", "gx"}
         if len(named) < 2 and not (thermometer or _is_complete(named)):
-            told = self._told(named, way or next((w for _, w in ways), None))
+            beside = () if named else _beside(checked, table)
+            told = self._told(named or beside, way or next((w for _, w in ways), None))
             if told is not None:
                 return {"0": told}
             self._say_unnamed(named, way)
@@ -239,6 +241,23 @@ class ColumnRecording(Recording):
             f" {quote(with_them)} if they are, or --columns"
             f" {quote(','.join(_columns_option(known, places, way.skip)))}"
         )
+
+
+def _beside(ways: Sequence[Heading], table: Array) -> tuple[HeadingMatch, ...]:
+    """Time and thermometer by the first heading of a table (n, k) that names no axis.
+
+    What only counts the rows is left to the question for the rate.
+    """
+    for way in ways:
+        if len(way.columns) == table.shape[1]:
+            counts = [is_row_counter(column) for column in table.T]
+            names = [
+                column._replace(name="") if counted else column
+                for column, counted in zip(way.columns, counts, strict=True)
+            ]
+            if (found := headings.match_beside(names, way.skip)) is not None:
+                return (found,)
+    return ()
 
 
 def _columns_of(table: Array, places: Mapping[str, int]) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Heading
+from fieldcal.importing.tables.clock_columns import with_clock_columns
 from fieldcal.importing.tables.column_times import (
     grows_each_row,
     is_row_counter,
@@ -38,6 +39,7 @@ def with_checked_times(way: Heading, table: Array) -> Heading:
     table : (n, k) numbers of the first rows; nan where a cell is none
 
     """
+    way = with_clock_columns(way, table)
     way = _without_sums(_with_thermometer(way, table), table)
     said = [heading_meaning(column.name, column.unit) for column in way.columns]
     named = [i for i, one in enumerate(said) if one is not None and one.kind == "t"]

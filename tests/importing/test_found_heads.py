@@ -247,6 +247,10 @@ def test_a_pause_of_minutes_is_one_where_the_clock_has_columns(tmp_path: Path) -
             "acc_left_shank_{0} gyr_shank_left_{0} acc_right_thigh_{0} gyr_thigh_{0}",
             {"left_shank": (0, 1), "right_thigh": (2, 3)},
         ),
+        # an r is no yaw rate where an axis stands beside it
+        ("L_Acc{0} L_Gyr{0} R_Acc{0} R_Gyr{0}", {"l": (0, 1), "r": (2, 3)}),
+        # of counts and what is made of them the latter; nothing in axes of the Earth
+        ("accel_{0} gyro_{0} accel_{0}_g gyro_{0}_dps GlobalAcc{0}", {"0": (2, 3)}),
     ],
 )
 def test_each_accelerometer_has_its_gyroscope(
@@ -260,6 +264,75 @@ def test_each_accelerometer_has_its_gyroscope(
             first = 1 + 3 * three
             called = one.columns[first : first + 3]
             assert called == tuple(kind + axis for axis in "xyz")
+
+
+def test_gyroscopes_of_no_accelerometer_are_said() -> None:
+    heads = "acc_left_{0} acc_right_{0} gyr_hip_{0} gyr_head_{0}".split()
+    names = [one.format(x) for one in heads for x in "xyz"]
+    found = match_headings([Column("", name) for name in ("time", *names)], "_")
+    assert [one.name for one in found] == ["left", "right"]
+    assert "gyr_hip_x, gyr_hip_y, gyr_hip_z: go with no" in " ".join(found[0].says)
+
+
+def test_rows_share_the_second_of_a_clock_in_columns(tmp_path: Path) -> None:
+    """Seconds alone, of which each has as many rows, over the end of a minute."""
+    path = tmp_path / "log.csv"
+    s = np.floor(T + 58)
+    table = text(
+        "hour,minute,second,ax,ay,az,gx,gy,gz",
+        np.full(N, 12), s // 60, s % 60, A, W,
+    )  # fmt: skip
+    path.write_text(table + "\n")
+    block, _ = read_files([path])
+    np.testing.assert_allclose(np.diff(block.t), 0.02, atol=1e-6)
+
+
+def still(head: str, noise: float = 0.05) -> str:
+    """A device that lies for a minute, with biases of 0.1 and 0.2 deg/s, and noise."""
+    rng = np.random.default_rng(9)
+    t = np.arange(3000) / 50
+    acc = [0, 0, 1] + rng.normal(0, 2e-3, (3000, 3))
+    gyr = [0.1, -0.2, 0.1] + rng.normal(0, noise, (3000, 3))
+    rows = np.column_stack([t, acc, gyr])
+    return "\n".join([head, *(",".join(f"{x:.6f}" for x in row) for row in rows)])
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Time (UTC),Force Xv (g),Force Yv (g),Force Zv (g),Spin Xv (°/s),Spin Yv (°/s),"
+        "Spin Zv (°/s)",
+        "UTC Time,XV1 Load (g),XV2 Load (g),XV3 Load (g),XV1 Rot (deg/s),XV2 Rot"
+        " (deg/s),XV3 Rot (deg/s)",
+    ],
+)
+def test_columns_that_physics_tells_have_the_units_of_their_names(
+    tmp_path: Path, head: str
+) -> None:
+    """Without a turn rad/s would be as usual."""
+    path = tmp_path / "log.csv"
+    path.write_text(still(head) + "\n")
+    block, says = read_files([path])
+    rates = np.rad2deg(block.gyr.mean(axis=0))
+    np.testing.assert_allclose(rates, [0.1, -0.2, 0.1], atol=0.01)
+    assert [one for one in says if "--gyr-unit deg/s" in one]
+
+
+def test_rates_of_names_that_tell_no_unit_are_asked_about(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(still("time,Nx,Ny,Nz,p,q,r", 0.12) + "\n")
+    with pytest.raises(InputError, match="nothing says the unit of its rates"):
+        read_files([path])
+
+
+def test_a_letter_that_goes_up_and_down_is_no_time(tmp_path: Path) -> None:
+    """Counts of a thermometer behind the axes are asked about as such."""
+    path = tmp_path / "log.csv"
+    counts = np.round(340 * (WARM - 36.53) + 9 * np.sin(9 * T))
+    head = "ax (g),ay (g),az (g),gx (deg/s),gy (deg/s),gz (deg/s),T"
+    path.write_text("Fs,50\n" + text(head, A / G, DEG, counts) + "\n")
+    with pytest.raises(InputError, match="its temperature reads -.*which is no deg C"):
+        read_files([path])
 
 
 def test_what_lacks_gravity_is_no_gain_of_velocity(tmp_path: Path) -> None:
@@ -328,6 +401,7 @@ def test_an_imu_that_wakes_late_is_not_said_to_hold_zeros(
         ("Vitesse angulaire x (rad/s)", ("g", "x", "rad/s")),
         ("Accel X (m/s^2) left", ("a", "x", "m/s^2")),
         ("X[s]", ("t", "", "s")),
+        ("Time of day [h]", ("t", "", "h")),
         ("x (m/s^2)", ("a", "x", "m/s^2")),
     ],
 )

@@ -70,13 +70,16 @@ def _without_angle_gains(named: Sequence[NamedColumn]) -> list[NamedColumn]:
 
 
 def _without_counts(named: Sequence[NamedColumn]) -> list[NamedColumn]:
-    """Columns without counts of axes that are also given in units."""
-    axes = [n for n in named if n.says.axis and n.says.kind in "ag"]
-    in_units = {_axis_of(n) for n in axes if n.says.unit}
+    """Columns without counts, and without a unit, of what is also given in units.
+
+    ``accel_x`` beside ``accel_x_g``, ``temp`` beside ``temp_c`` are counts.
+    """
+    kinds = ("a", "g", "temperature")
+    there = [n for n in named if n.says.kind in kinds]
+    in_units = {_axis_of(n) for n in there if n.says.unit}
     return [
         n for n in named
-        if n not in axes or n.says.unit or _axis_of(n) not in in_units
-        or "raw" not in n.says.label
+        if n not in there or n.says.unit or _axis_of(n) not in in_units
     ]  # fmt: skip
 
 

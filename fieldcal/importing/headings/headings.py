@@ -95,6 +95,9 @@ def match_headings(
         clock = [_nearest_before(clock[0], times, both, columns)] if clock else steps
         chosen = [*clock, *parts, *both, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
+    if left := [three for three in gyr.values() if acc and three not in rates.values()]:
+        told = _left_out([columns[n.number].name for n in left[0]])
+        found[0] = replace(found[0], says=(*found[0].says, told))
     if len(found) == 1:
         found = [replace(found[0], name="0")]
     return tuple(found)
@@ -109,6 +112,11 @@ def match_beside(columns: Sequence[Column], skip: str = "") -> HeadingMatch | No
     warm, says = _thermometer(named, ())
     chosen = [*_plainest(times, OTHER_CLOCK), *parts, *warm]
     return _match(columns, chosen, skip, "0", says) if chosen else None
+
+
+def _left_out(names: Sequence[str]) -> str:
+    """Say that rates are taken of no IMU."""
+    return f"{', '.join(names)}: go with no accelerometers by their names; left out"
 
 
 def columns_without_axes(columns: Sequence[Column]) -> list[int]:
@@ -284,7 +292,7 @@ def _match(
     reversed_ = frozenset(n.says.kind + n.says.axis for n in forces if turned)
     says = (*says, told) if told else says
     axes = [words_in_name(columns[n.number].name) for n in chosen if n.says.axis]
-    ros = all(any({*part} <= {*words} for part in ROS) for words in axes)
+    ros = bool(axes) and all(any({*part} <= {*words} for part in ROS) for words in axes)
     usual = "rad/s" if ros else ""
     free = any(n.says.kind == "a" and n.says.weak and not n.says.gain for n in chosen)
     return HeadingMatch(tuple(found), units, name, says, usual, reversed_, free)

@@ -173,13 +173,21 @@ class ColumnRecording(Recording):
         width = self.beginning().shape[1]
         for way in self.heading():
             if len(way.columns) == width:
-                units = units_over(way.columns, at)
-                with_them = with_units(wanted, units)
+                with_them = self._with_units_over(wanted, way, at)
                 if with_them != wanted:
-                    options = " ".join(unit_options(wanted, with_them))
-                    self.says.append(f"taken from {NAMES}: {options}")
                     return with_them
         return wanted
+
+    def _with_units_over(
+        self, wanted: ReadOptions, way: Heading, at: Mapping[str, int]
+    ) -> ReadOptions:
+        """Options with the units that stand over channels in numbered columns."""
+        with_them = with_units(wanted, units_over(way.columns, at))
+        if with_them != wanted:
+            options = " ".join(unit_options(wanted, with_them))
+            said = f"taken from {NAMES}: {options}"
+            self.says += [said] if said not in self.says else []
+        return with_them
 
     def _told(
         self, named: Sequence[HeadingMatch], way: Heading | None
@@ -207,7 +215,11 @@ class ColumnRecording(Recording):
         said = ",".join(with_signs(chosen, wanted.reversed))
         self.guessed["columns"] = f"{said}: {told.why}"
         self.says += [s for one in named[:1] for s in one.says if s not in self.says]
-        return replace(wanted, columns=chosen)
+        wanted = replace(wanted, columns=chosen)
+        if way is None or len(way.columns) != k:
+            return wanted
+        at = {channel: i for i, channel in told.channels.items()}
+        return self._with_units_over(wanted, way, at)
 
     def _say_unnamed(self, named: Sequence[HeadingMatch], way: Heading | None) -> None:
         """Ask about axes that no name says where none are the accelerometers.

@@ -31,6 +31,7 @@ SPELLINGS = {
     "ns": ("ns", "nsec", "nsecs", "nano", "nanos", "nanosec", "nanosecs",
            "nanoseconds", "nanosecond"),
     "min": ("min", "mins", "minute", "minutes"),
+    "h": ("h", "hrs"),
     "deg C": ("c", "°c", "°", "'c", "degc", "deg c", "celsius", "℃", "degrees c",
               "deg.c", "ºc"),
     "K": ("kelvin", "degk", "deg k"),
@@ -59,7 +60,7 @@ TELLING = ("m/s^2", "mm/s^2", "rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "d
 UNITS = {
     "a": ("m/s^2", "mm/s^2", "cm/s^2", "g", "mg", "ug"),
     "g": ("rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "deg/h"),
-    "t": ("s", "ms", "us", "ns", "min"),
+    "t": ("s", "ms", "us", "ns", "min", "h"),
     "dt": ("s", "ms", "us", "ns"),
     "temperature": tuple(TEMPERATURES),
     "m": (),

@@ -75,6 +75,7 @@ TEMPERATURES = ("temp", "temperature", "tmp", "temper", "temperatur", "temperatu
                 "температура", "温度", "気温", "온도")  # fmt: skip
 
 WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world",
-                   "earth", "rotated", "est", "estimated")  # fmt: skip
+                   "earth", "global", "ned", "enu", "rotated", "est",
+                   "estimated")  # fmt: skip
 """Words of accelerations that may lack gravity, lie in axes of the Earth, or are what a
 filter computes of others."""

@@ -247,6 +247,20 @@ def test_a_pause_of_minutes_is_one_where_the_clock_has_columns(tmp_path: Path) -
             "acc_left_shank_{0} gyr_shank_left_{0} acc_right_thigh_{0} gyr_thigh_{0}",
             {"left_shank": (0, 1), "right_thigh": (2, 3)},
         ),
+        # what stands in brackets before the unit, or with a number
+        (
+            "Acc{0}|(bmi)|(g) Gyr{0}|(bmi)|(dps) Acc{0}|(icm)|(g) Gyr{0}|(icm)|(dps)",
+            {"bmi": (0, 1), "icm": (2, 3)},
+        ),
+        ("Acc{0}|(1) Gyr{0}|(1) Acc{0}|(2) Gyr{0}|(2)", {"1": (0, 1), "2": (2, 3)}),
+        (
+            "accel_{0}_x1 gyro_{0}_x1 accel_{0}_x2 gyro_{0}_x2",
+            {"x_1": (0, 1), "x_2": (2, 3)},
+        ),
+        (
+            "gx3.accel.{0} gx3.gyro.{0} mpu.accel.{0} mpu.gyro.{0}",
+            {"gx_3": (0, 1), "mpu": (2, 3)},
+        ),
         # an r is no yaw rate where an axis stands beside it
         ("L_Acc{0} L_Gyr{0} R_Acc{0} R_Gyr{0}", {"l": (0, 1), "r": (2, 3)}),
         # of counts and what is made of them the latter; nothing in axes of the Earth
@@ -343,6 +357,30 @@ def test_what_lacks_gravity_is_no_gain_of_velocity(tmp_path: Path) -> None:
     path.write_text(text("time_ms,FreeAcc_X,FreeAcc_Y,FreeAcc_Z", T * 500, free) + "\n")
     with pytest.raises(InputError, match="seems to be taken out"):
         read_files([path])
+
+
+def test_of_two_linear_accelerations_that_with_gravity_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    head = "time,lin_acc_x,lin_acc_y,lin_acc_z," + ",".join(
+        f"linear_acceleration.{x}" for x in "xyz"
+    )
+    lacking = np.random.default_rng(1).normal(0, 0.1, (N, 3))
+    path.write_text(text(head, T, lacking, A) + "\n")
+    block, _ = read_files([path])
+    np.testing.assert_allclose(block.acc, A, atol=2e-6)
+
+
+def test_gravity_is_not_added_to_counts_that_hold_it(tmp_path: Path) -> None:
+    """Twice as many counts in a g would be usual as well."""
+    path = tmp_path / "log.csv"
+    head = "time," + ",".join(
+        f"{name}_{x}" for name in ("linear_acceleration", "gravity") for x in "xyz"
+    )
+    counts = np.round(A / G * 16384)
+    down = np.round(counts / np.linalg.norm(counts, axis=1)[:, None] * 16384)
+    path.write_text(text(head, T, counts, down) + "\n")
+    block, _ = read_files([path])
+    np.testing.assert_allclose(block.acc, A, atol=1e-3)
 
 
 def test_gains_of_velocity_go_before_what_lacks_gravity(tmp_path: Path) -> None:

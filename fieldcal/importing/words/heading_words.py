@@ -182,24 +182,8 @@ def _meaning_of_words(words: list[str], unit: str | None) -> HeadingMeaning | No
             weak = kind == "linear" or gain
             found = _with_axis("a" if kind == "linear" else kind, rest, unit, weak)
             return found._replace(gain=gain) if found is not None else None
-    for i, word in enumerate(words):
-        rest = words[:i] + words[i + 1 :]
-        kind = next((k for k, names in SENSORS.items() if word[:-1] in names), "")
-        # of "GyX" the axis is the X
-        apart = word in SENSORS["g"] and bool(rest[i:]) and rest[i] in "xyz"
-        if kind and word[-1] in "xyz" and not apart:
-            return HeadingMeaning(kind, word[-1], unit, tuple(rest))
-        kind = next((k for k, names in SENSORS.items() if word[1:] in names), "")
-        if kind and word[0] in "xyz" and len(word) > len("xg"):
-            return HeadingMeaning(kind, word[0], unit, tuple(rest))
-    for i, word in enumerate(words):
-        rest = words[:i] + words[i + 1 :]
-        kind = next((k for k, names in SENSORS.items() if word in names), "")
-        # a letter stands before its axis: "x_g" is an axis in g
-        if kind and (len(word) > 1 or (rest[i:] and rest[i] in AXES)):
-            found = _with_axis(kind, rest, unit)
-            if found is not None:
-                return found
+    if (found := _meaning_of_sensor(words, unit)) is not None:
+        return found
     if (time := _time_meaning(words, unit)) is not None:
         return time
     for word in THERMOMETER_NAMES:
@@ -210,6 +194,51 @@ def _meaning_of_words(words: list[str], unit: str | None) -> HeadingMeaning | No
         return HeadingMeaning("", alone[0], unit, alone[1])
     # whatever it is called, an axis in rad/s is one of a gyroscope
     return _with_axis("", words, unit) if unit in TELLING else None
+
+
+def _meaning_of_sensor(words: list[str], unit: str | None) -> HeadingMeaning | None:
+    """The meaning of an axis of a sensor: words before letters, as those of ``gx3``."""
+    for letters in (False, True):
+        for find in (_joined_meaning, _parted_meaning):
+            if (found := find(words, unit, letters)) is not None:
+                return found
+    return None
+
+
+def _joined_meaning(
+    words: list[str], unit: str | None, letters: bool
+) -> HeadingMeaning | None:
+    """The meaning of a word that is a sensor and its axis: ``accx``, or ``gx``."""
+    for i, word in enumerate(words):
+        rest = words[:i] + words[i + 1 :]
+        if (len(word) == len("gx")) != letters:
+            continue
+        kind = next((k for k, names in SENSORS.items() if word[:-1] in names), "")
+        # of "GyX" the axis is the X
+        apart = word in SENSORS["g"] and bool(rest[i:]) and rest[i] in "xyz"
+        if kind and word[-1] in "xyz" and not apart:
+            return HeadingMeaning(kind, word[-1], unit, tuple(rest))
+        kind = next((k for k, names in SENSORS.items() if word[1:] in names), "")
+        if kind and word[0] in "xyz" and len(word) > len("xg"):
+            return HeadingMeaning(kind, word[0], unit, tuple(rest))
+    return None
+
+
+def _parted_meaning(
+    words: list[str], unit: str | None, letters: bool
+) -> HeadingMeaning | None:
+    """The meaning of a sensor whose axis is another word."""
+    for i, word in enumerate(words):
+        rest = words[:i] + words[i + 1 :]
+        if (len(word) == 1) != letters:
+            continue
+        kind = next((k for k, names in SENSORS.items() if word in names), "")
+        # a letter stands before its axis: "x_g" is an axis in g
+        if kind and (not letters or (rest[i:] and rest[i] in AXES)):
+            found = _with_axis(kind, rest, unit)
+            if found is not None:
+                return found
+    return None
 
 
 def bare_axis(words: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
@@ -249,10 +278,12 @@ def _with_axis(
     kind: str, rest: list[str], unit: str | None, weak: bool = False
 ) -> HeadingMeaning | None:
     """Meaning with the last axis among the other words; None if there is none."""
-    letters = [i for i, word in enumerate(rest) if word in "xyz" and len(word) == 1]
+    letters = [i for i, word in enumerate(rest) if word in AXES]
     if not letters:
         return None
-    at = letters[-1]
+    # of "acc_x_x1" the x with a number says which sensor it is
+    plain = [i for i in letters if not "".join(rest[i + 1 : i + 2]).isdecimal()]
+    at = (plain or letters)[-1]
     return HeadingMeaning(kind, rest[at], unit, tuple(rest[:at] + rest[at + 1 :]), weak)
 
 

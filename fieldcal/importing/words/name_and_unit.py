@@ -58,10 +58,12 @@ def name_unit_splits(name: str, unit: str) -> Iterator[Split]:
 def _bracketed(name: str) -> Iterator[Split]:
     """Splits by brackets at the end, or before the last words."""
     if whole := _BRACKETS.fullmatch(name):
-        yield whole.group(1), parse_unit(whole.group(2))
         last = _LAST_BRACKETS.fullmatch(name)
-        if last and last.group(1).strip() != whole.group(1):
-            yield last.group(1), parse_unit(last.group(2))
+        behind = last is not None and last.group(1).strip() != whole.group(1)
+        if last and behind and (unit := parse_unit(last.group(2))):
+            # what stands in the brackets before the unit says which sensor it is
+            yield last.group(1), unit
+        yield whole.group(1), parse_unit(whole.group(2))
     elif (inner := _INNER_UNIT.fullmatch(name)) and parse_unit(inner.group(2)):
         yield f"{inner.group(1)} {inner.group(3)}", parse_unit(inner.group(2))
 

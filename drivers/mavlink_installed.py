@@ -64,8 +64,16 @@ def ardupilot_prefix(what: str, instance: int, first: str = "") -> str:
     return f"INS_{what}{number if instance else first}"
 
 
-def parameter_names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
+def parameter_names(
+    autopilot: int, instance: int, gyr_instance: int | None = None
+) -> dict[str, tuple[str, ...]]:
     """Names of the parameters for offsets, scales and mounting, by what they hold.
+
+    Parameters
+    ----------
+    autopilot : number of its program
+    instance : which of its sensors, from 0
+    gyr_instance : likewise of the gyroscope, where PX4 has it under another number
 
     >>> parameter_names(ARDUPILOT, 1)["acc_scale"]
     ('INS_ACC2SCAL_X', 'INS_ACC2SCAL_Y', 'INS_ACC2SCAL_Z')
@@ -79,10 +87,11 @@ def parameter_names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]
             "rotation": ("AHRS_ORIENTATION",),
         }
     if autopilot == PX4:
+        other = instance if gyr_instance is None else gyr_instance
         return {
             "acc_offset": tuple(f"CAL_ACC{instance}_{axis}OFF" for axis in AXES),
             "acc_scale": tuple(f"CAL_ACC{instance}_{axis}SCALE" for axis in AXES),
-            "gyr_offset": tuple(f"CAL_GYRO{instance}_{axis}OFF" for axis in AXES),
+            "gyr_offset": tuple(f"CAL_GYRO{other}_{axis}OFF" for axis in AXES),
             "rotation": ("SENS_BOARD_ROT",),
         }
     return {}
@@ -151,6 +160,7 @@ class InstalledCalibration:
     taken_out : whether the autopilot was told to use o = 0 and k = 1
     in_samples : all parameters as they were last read; these are applied to the
         samples. Unless `taken_out`, they are also in `values`.
+    gyr_instance : number of the gyroscope's parameters; None where it is `instance`
 
     """
 
@@ -159,11 +169,17 @@ class InstalledCalibration:
     values: dict[str, float] = field(default_factory=dict)
     taken_out: bool = False
     in_samples: dict[str, float] = field(default_factory=dict)
+    gyr_instance: int | None = None
+
+    @property
+    def names(self) -> dict[str, tuple[str, ...]]:
+        """Names of its parameters, as of `parameter_names`."""
+        return parameter_names(self.autopilot, self.instance, self.gyr_instance)
 
     @property
     def missing(self) -> list[str]:
         """Parameters that have not been received, or are no finite number."""
-        known = parameter_names(self.autopilot, self.instance).values()
+        known = self.names.values()
         return [
             name
             for some in known
@@ -174,7 +190,7 @@ class InstalledCalibration:
     @property
     def damage(self) -> str:
         """Error text for values that are impossible; empty if there are none."""
-        scales = parameter_names(self.autopilot, self.instance).get("acc_scale", ())
+        scales = self.names.get("acc_scale", ())
         odd = {n: v for n, v in self.values.items() if not np.isfinite(v)}
         odd |= {n: v for n in scales if (v := self.values.get(n, 1.0)) <= 0}
         if not odd:
@@ -201,7 +217,7 @@ class InstalledCalibration:
 
     def vector(self, what: str) -> Array:
         """Return ``acc_offset``, ``acc_scale`` or ``gyr_offset``, (3,), nan unknown."""
-        some = parameter_names(self.autopilot, self.instance).get(what, ("",) * 3)
+        some = self.names.get(what, ("",) * 3)
         return np.array([self.values.get(name, np.nan) for name in some])
 
     def nominal(self, otherwise: Nominal) -> Nominal:
@@ -236,7 +252,7 @@ class InstalledCalibration:
         """
         if self.damage:
             raise InputError(self.damage)
-        known = parameter_names(self.autopilot, self.instance)
+        known = self.names
         if self.missing or not known:
             lacking = ", ".join(self.missing) or "any parameter of this autopilot"
             raise InputError(
@@ -264,9 +280,11 @@ class InstalledCalibration:
 
     def as_table(self) -> dict[str, Any]:
         """Table that a recording keeps."""
+        apart = {} if self.gyr_instance is None else {"gyr_instance": self.gyr_instance}
         return {
             "autopilot": self.autopilot,
             "instance": self.instance,
+            **apart,
             "parameters": {n: v for n, v in self.values.items() if np.isfinite(v)},
             "missing": self.missing,
             "taken_out": self.taken_out,
@@ -275,7 +293,7 @@ class InstalledCalibration:
 
     def _in_samples(self) -> dict[str, list[float]] | None:
         """Offsets and scales (1) that were applied to the samples; None if unknown."""
-        known = parameter_names(self.autopilot, self.instance)
+        known = self.names
         used = {
             what: [self.in_samples.get(n, np.nan) for n in known[what]]
             for what in known
@@ -299,7 +317,13 @@ class InstalledCalibration:
         try:
             values = {str(k): float(v) for k, v in table["parameters"].items()}
             places = int(table["autopilot"]), int(table["instance"])
-            return cls(*places, values, bool(table["taken_out"]))
+            gyr = table.get("gyr_instance")
+            return cls(
+                *places,
+                values,
+                bool(table["taken_out"]),
+                gyr_instance=None if gyr is None else int(gyr),
+            )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(
                 f"what the device had installed is not told in full ({error!r}): "
@@ -311,7 +335,7 @@ def identity_parameters(installed: InstalledCalibration) -> dict[str, float]:
     """Parameters of a calibration that changes nothing; empty if not all are known."""
     if installed.missing:
         return {}
-    known = parameter_names(installed.autopilot, installed.instance)
+    known = installed.names
     nothing = {"acc_offset": 0.0, "acc_scale": 1.0, "gyr_offset": 0.0}
     return {
         name: value for what, value in nothing.items() for name in known.get(what, ())

@@ -22,19 +22,14 @@ from fieldcal.drivers.codec import recognise_format
 from fieldcal.importing import columns
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.files.text_encoding import is_mostly_text, utf16_encoding
-from fieldcal.importing.headings.heading import Column, Heading
-from fieldcal.importing.headings.sensor_columns import (
-    AXES,
-    of_sensor,
-    with_clock_column,
-)
+from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
-from fieldcal.importing.tables.column_times import keeps_growing
+from fieldcal.importing.tables.text_heading import TextHeading
 from fieldcal.importing.text.instances import ImuInstances, find_instances
 from fieldcal.importing.text.number_table import NumberTable
 from fieldcal.importing.text.text_form import TextForm
-from fieldcal.importing.text.text_forms import CLOCK, forms_of
+from fieldcal.importing.text.text_forms import forms_of
 from fieldcal.importing.text.text_lines import (
     TOP,
     cell_count,
@@ -47,10 +42,9 @@ from fieldcal.importing.text.text_top import (
     count_top_lines,
     find_separator,
     find_stated_rate,
-    headings_above,
     parse_numbers,
 )
-from fieldcal.importing.words.file_names import SENSOR, sensor_of_file_name
+from fieldcal.importing.words.file_names import sensor_of_file_name
 
 WHAT = "text with columns"
 
@@ -106,38 +100,12 @@ class TextColumns(ColumnRecording):
 
     def heading(self) -> list[Heading]:
         """What stands above its numbers."""
-        found = headings_above(self._lines, self.wanted.separator)
-        for form in self._forms:
-            self.says += [form.says] if form.says not in ("", *self.says) else []
-            if form.names:
-                found = [Heading([Column("", name) for name in form.names], SKIP)]
-            if form.clock is not None:
-                found = [with_clock_column(one, form.clock, CLOCK) for one in found]
-        found = [one for way in found if (one := self._fitted(way)) is not None]
-        sensor = self.sensor or sensor_of_file_name(self.path.name.split(".")[0])
-        if not sensor:
-            return found
-        told_by = "the names of its columns and of the file"
-        if not found and (names := self._three_axes()):
-            told_by = "the name of the file"
-            found = [Heading([Column("", name) for name in names], SKIP)]
-        ways = [
-            Heading([of_sensor(sensor, c) for c in way.columns], way.skip)
-            for way in found
-        ]
-        if not self.sensor and ways != found:
-            of_it = f"its axes are those of the {SENSOR[sensor]}, as the file is called"
-            self.says += [of_it] if of_it not in self.says else []
-            self.told_by = told_by
-        return ways
-
-    def _three_axes(self) -> tuple[str, ...]:
-        """Names for three columns alone, or behind one that is their time."""
-        width = self._numbers.shape[1]
-        grows = [keeps_growing(column) for column in self._numbers.T]
-        if width == len(AXES) + 1 and grows[0] and not any(grows[1:]):
-            return ("t", *AXES)
-        return tuple(AXES) if width == len(AXES) else ()
+        above = TextHeading(self._lines, self._numbers, self.wanted.separator)
+        stem = self.path.name.split(".")[0]
+        found = above.read(self._forms, self.sensor, sensor_of_file_name(stem))
+        self.says += [s for s in found.says if s not in self.says]
+        self.told_by = found.told_by or self.told_by
+        return found.ways
 
     def imus(self) -> dict[str, ReadOptions]:
         """Options of each IMU by its name; columns may be chosen by their names."""
@@ -202,19 +170,6 @@ class TextColumns(ColumnRecording):
             f" {', '.join(channels)}; there are {there or 'none'}: say what each column"
             " is in its order, such as --columns t,ax,ay,az,_"
         )
-
-    def _fitted(self, way: Heading) -> Heading | None:
-        """A heading as wide as the rows; None if its names stand over other columns.
-
-        Lines may end with a separator, those of names or those of numbers.
-        """
-        table, names = self._numbers, [*way.columns]
-        width = table.shape[1]
-        while len(names) > width and not names[-1].name and width:
-            names.pop()
-        if len(names) == width - 1 and np.isnan(table[:, -1]).all():
-            names.append(Column("", ""))
-        return Heading(names, way.skip) if len(names) == width or not width else None
 
     def beginning(self) -> Array:
         """Numbers of the first lines."""
@@ -330,6 +285,8 @@ class TextColumns(ColumnRecording):
         """What tells several IMUs apart whose rows come in turn."""
         first = next((top_lines(d) for d in self._text.pieces(self._forms)), [])
         found = find_instances(first, self.wanted.separator)
+        if found is not None:
+            found = found.over(map(split_lines, self._text.pieces(self._forms)))
         self.says += found.says if found is not None else []
         return found
 

@@ -24,7 +24,6 @@ from fieldcal.drivers.mavlink_installed import (
 )
 from fieldcal.drivers.mavlink_units import untruncated_mean
 from fieldcal.importing.messages.dataflash_messages import (
-    AXES,
     BODY,
     FMT,
     HEAD,
@@ -34,6 +33,7 @@ from fieldcal.importing.messages.dataflash_messages import (
 )
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.fifo_time import FifoBatch, FifoBatches
+from fieldcal.importing.words.sensor_words import AXES
 
 WHAT = "ArduPilot dataflash log, .bin"
 

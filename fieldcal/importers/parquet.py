@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
+from fieldcal.importing.arrays.nested_arrow import flat_batches, flat_name
 from fieldcal.importing.files.gzip_stream import unpacked_file
 from fieldcal.importing.headings.heading import Column, Heading
 from fieldcal.importing.recording import ROWS
@@ -26,6 +28,8 @@ WHAT = "Parquet and Arrow"
 
 TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in one of what stored times count."""
+
+_PLACE = re.compile(r"\.([0-2])$")
 
 PARQUET, FEATHER, STREAM = b"PAR1", b"ARROW1", b"\xff\xff\xff\xff"
 
@@ -100,16 +104,16 @@ class ParquetFile(ColumnRecording):
                     schema = opened.schema_arrow
                     one: dict[str, Any] = {"use_threads": False}
                     if self.wanted.columns and not every:
-                        one["columns"] = [*self._named(schema).values()]
-                    yield schema, opened.iter_batches(ROWS, **one)
+                        one["columns"] = self._needed(schema.names)
+                    yield flat_batches(schema, opened.iter_batches(ROWS, **one))
                 elif magic == FEATHER:
                     feather = pa.ipc.open_file(file)
                     many = range(feather.num_record_batches)
                     each = (feather.get_batch(i) for i in many)
-                    yield feather.schema, _gathered(each)
+                    yield flat_batches(feather.schema, _gathered(each))
                 else:
                     stream = pa.ipc.open_stream(file)
-                    yield stream.schema, _gathered(stream)
+                    yield flat_batches(stream.schema, _gathered(stream))
             except MemoryError as error:  # also of a damaged size
                 raise InputError(
                     f"{self.path}: needs more memory than there is, or is damaged; copy"
@@ -120,6 +124,12 @@ class ParquetFile(ColumnRecording):
                     f"{self.path}: is not whole: {error}; copy it again from where it"
                     " came"
                 ) from error
+
+    def _needed(self, names: Sequence[str]) -> list[str]:
+        """Columns of the file in which those wanted lie; all if one is not there."""
+        pairs = [c.partition("=") for c in self.wanted.columns]
+        there = {flat_name(name or column, names): None for column, _, name in pairs}
+        return [*there] if there.keys() <= {*names} else [*names]
 
     def _named(self, schema: Any) -> dict[str, str]:
         """Names in the file by column."""
@@ -188,7 +198,9 @@ def _column(field: Any) -> Column:
     import pyarrow as pa
 
     if not (pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type)):
-        return Column(field.name, field.name, _unit(field))
+        # of a list: acc.0 is the axis of an array
+        called = _PLACE.sub(r"[\1]", field.name)
+        return Column(field.name, called, _unit(field))
     said = heading_meaning(field.name)
     named = said is not None and said.kind == "t"
     return Column(field.name, field.name if named else "time", "s")

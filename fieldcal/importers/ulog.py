@@ -107,15 +107,19 @@ class UlogFile(Recording):
             steps = [self._first(some, "scale") for some in ((topic, number), gyro)]
             acc, gyr = (step or 0.0 for step in steps)
             told["grain"] = {"acc": acc, "gyr": gyr, "cut": False}
-        slot = self._slot(identifier)
+        slot = self._slot("ACC", identifier)
         if slot is None:
             return told | {"installed": None}
+        other = self._slot("GYRO", self._gyroscope(topic, number))
+        other = None if other == slot else other
         params = self._log.parameters
-        wanted = [n for some in parameter_names(PX4, slot).values() for n in some]
-        values = {n: params[n] for n in wanted if n in params}
+        names = parameter_names(PX4, slot, other).values()
+        values = {n: params[n] for some in names for n in some if n in params}
         if raw:
             values |= {"SENS_BOARD_ROT": 0.0}
-        installed = InstalledCalibration(PX4, slot, values, taken_out=raw)
+        installed = InstalledCalibration(
+            PX4, slot, values, taken_out=raw, gyr_instance=other
+        )
         return told | {"installed": installed.as_table()}
 
     def _identifier(self, topic: str, number: int) -> int | None:
@@ -144,9 +148,18 @@ class UlogFile(Recording):
         same = [n for n in there if self._first((gyro, n), "device_id") == mine]
         return same[0] if mine and len(same) == 1 else number
 
-    def _slot(self, identifier: int | None) -> int | None:
-        """Which set of parameters a sensor has."""
-        ids = {n: self._log.parameters.get(f"CAL_ACC{n}_ID") for n in range(4)}
+    def _gyroscope(self, topic: str, number: int) -> int | None:
+        """Id of the gyroscope; None if the log does not say it."""
+        if topic in PARTNERS:
+            where = PARTNERS[topic], self._partner(topic, number)
+            found = self._first(where, "device_id")
+        else:
+            found = self._first((topic, number), "gyro_device_id")
+        return None if found is None else int(found)
+
+    def _slot(self, triad: str, identifier: int | None) -> int | None:
+        """Which set of parameters of ACC or GYRO, each with its own, a sensor has."""
+        ids = {n: self._log.parameters.get(f"CAL_{triad}{n}_ID") for n in range(4)}
         slots = [n for n, value in ids.items() if value and value == identifier]
         return slots[0] if slots else None
 

@@ -11,7 +11,7 @@ from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.core.sentences import join_words
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.times.repeats import NO_VALUES, RepeatFinder
-from fieldcal.importing.times.row_times import FRACTIONS, RowTimes
+from fieldcal.importing.times.row_times import CLOCK_PARTS, RowTimes
 from fieldcal.importing.units.missing_numbers import MissingNumbers
 from fieldcal.importing.units.scales import MIN_ROWS
 from fieldcal.session.text_files import SAMPLE_COLUMNS
@@ -31,7 +31,7 @@ SOME = 0.05
 WITHOUT_GRAVITY = ("lx", "ly", "lz")
 """Columns of an acceleration without gravity, where ``ax ay az`` are gravity alone."""
 
-KNOWN = (*SAMPLE_COLUMNS, "dt", *FRACTIONS, *WITHOUT_GRAVITY)
+KNOWN = (*SAMPLE_COLUMNS, "dt", *CLOCK_PARTS, *WITHOUT_GRAVITY)
 """What columns may be called."""
 
 

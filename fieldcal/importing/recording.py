@@ -57,6 +57,7 @@ TIME_UNITS = {
     "ns": 1e-9,
     "100ns": 1e-7,
     "min": 60.0,
+    "h": 3600.0,
     "d": 86400.0,
     "hhmmss": 1.0,
 }
@@ -112,6 +113,7 @@ class ReadOptions:
     tick : step of a clock too coarse for its rows, in its unit; 0 of others
     written_again : whether each of them was written several times
     usual : unit of rates that such names of columns have; "" where they tell none
+    free : whether the names of accelerations are those of ones without gravity
 
     """
 
@@ -135,6 +137,7 @@ class ReadOptions:
     tick: float = 0.0
     written_again: bool = False
     usual: str = ""
+    free: bool = False
     acc_zero: tuple[float, ...] = ()
 
     @property
@@ -199,6 +202,7 @@ class Recording(ABC):
     guessed : what was taken for what nobody said, and why, by what it is
     ends_early : whether it was cut off, as far as it was read
     began : stamp of the first row, s, where times count from that row; nan if unknown
+    columns_said : whether the user said what its columns are
     sensor : what bare axes are of, where something else than the file says it
     lacks_gravity : whether gravity, which another file holds, is added to its forces
 
@@ -221,6 +225,7 @@ class Recording(ABC):
 
     def __init__(self, path: Path, wanted: ReadOptions, repair: bool = False) -> None:
         self.path, self.wanted, self.repair = path, wanted, repair
+        self.columns_said = bool(wanted.columns)
         modules, extra = self.needs()
         if missing := [m for m in modules if find_spec(m) is None]:
             raise InputError(

@@ -17,7 +17,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import reduce_to_diagonal
-from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
 from fieldcal.session.folder import Session
 
 WIDEST = {"acc_offset": 3.5, "gyr_offset": 0.5}
@@ -91,7 +91,7 @@ def changes(
         "acc_scale": np.abs(k) * _sigma(found, "acc_scale") / acc.scale**2,
         "gyr_offset": _sigma(found, "gyr_bias"),
     }
-    known = parameter_names(installed.autopilot, installed.instance)
+    known = installed.names
     return tuple(
         Change(name, installed.values[name], new[name], float(s), UNITS[what])
         for what, sigmas in sigma.items()
@@ -117,7 +117,7 @@ def problems(
     wanted: tuple[Change, ...], installed: InstalledCalibration
 ) -> tuple[str, ...]:
     """Implausible values, a sentence each."""
-    known = parameter_names(installed.autopilot, installed.instance)
+    known = installed.names
     said = []
     for change in wanted:
         what = next(w for w, some in known.items() if change.name in some)

@@ -19,6 +19,7 @@ from small_files import SMALL, Small, whole
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.samples import Block, concat
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
 from fieldcal.importers import formats, open_recording
 from fieldcal.importing import recording as recordings
 from fieldcal.importing.recording import ReadOptions
@@ -86,6 +87,24 @@ def test_px4_sensors_are_kept_apart_with_their_own_calibration(tmp_path: Path) -
     np.testing.assert_array_equal(combined.gyr, imu(3).gyr)
     told = mark(out / "sensor_combined.0", "device")["installed"]
     assert told["instance"] == 1 and not told["taken_out"]
+
+
+def test_px4_gyroscopes_have_parameters_of_their_own_number(tmp_path: Path) -> None:
+    """PX4 numbers those of accelerometers and gyroscopes as each was calibrated."""
+    own = {"CAL_GYRO0_ID": 101.0, "CAL_GYRO1_ID": 100.0, "CAL_GYRO0_XOFF": 0.75,
+           "CAL_GYRO0_YOFF": 0.0, "CAL_GYRO0_ZOFF": -0.25}  # fmt: skip
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulog({0: imu(1), 1: imu(2)}, SLOT | own))
+    out = tmp_path / "out"
+    assert main(["import", str(path), "-o", str(out)]) == 0
+    told = mark(out / "sensor_accel.1", "device")["installed"]
+    assert (told["instance"], told["gyr_instance"]) == (1, 0)
+    assert "CAL_GYRO1_XOFF" not in told["parameters"] and not told["missing"]
+    installed = InstalledCalibration.from_table(told)
+    np.testing.assert_allclose(installed.vector("gyr_offset"), [0.75, 0.0, -0.25])
+    after = installed.parameters_after(np.zeros(3), np.ones(3), np.full(3, 0.5))
+    assert after["CAL_GYRO0_XOFF"] == 0.5 and "CAL_GYRO1_XOFF" not in after
+    assert not list(file_faults(out / "sensor_accel.1"))
 
 
 @pytest.mark.parametrize("stamp", [0.5, 9999.0])

@@ -82,9 +82,19 @@ def test_small_temperatures_beside_800_counts_in_a_g_may_be_counts(
     call = ["import", str(path), "-o", str(tmp_path / "out")]
     assert main(call) == 2
     said = capsys.readouterr().err
-    assert "--temp-unit count --temp-lsb 13.5391 --temp-zero 31 (31.3 to" in said
+    assert "--temp-lsb 13.5391 --temp-zero 31 (ADIS16448: 31.3 to" in said
     assert "--temp-unit degC, if it is so" in said
     assert main([*call, "--temp-unit", "degC"]) == 0
+
+
+def test_rates_beside_cm_s2_are_in_sixteenths(tmp_path: Path) -> None:
+    """Those of a full scale of 2000 deg/s are 2 % more, and both fit the turns."""
+    rows = np.column_stack([T * 1e3, np.round(100 * A), np.round(16 * DEG)])
+    path = write(tmp_path, rows, heading="ms,ax,ay,az,gx,gy,gz")
+    call = ["import", str(path), "-o", str(tmp_path / "out")]
+    assert main([*call, "--acc-unit", "cm/s^2"]) == 0
+    gyr = Session.open(tmp_path / "out").block.gyr
+    np.testing.assert_allclose(gyr, np.deg2rad(rows[:, 4:] / 16), rtol=1e-9)
 
 
 def test_rows_without_a_value_may_have_another_clock(tmp_path: Path) -> None:

@@ -66,6 +66,7 @@ class HeadingMatch:
     says : what the user must know of them, a sentence each
     usual : unit that rates of such names are in; "" where names tell none
     reversed : channels whose sign is the other one, by what writes such names
+    free : whether its accelerations are called as those without gravity are
 
     """
 
@@ -75,6 +76,7 @@ class HeadingMatch:
     says: tuple[str, ...] = ()
     usual: str = ""
     reversed: frozenset[str] = frozenset()
+    free: bool = False
 
     def taken(self, wanted: ReadOptions) -> ReadOptions:
         """Return what the user says, with what the names say."""
@@ -92,6 +94,7 @@ class HeadingMatch:
             named=frozenset(by_name),
             usual=self.usual,
             reversed=wanted.reversed | self.reversed,
+            free=self.free,
         )
 
     def sentence(

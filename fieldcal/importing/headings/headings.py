@@ -10,21 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
+from fieldcal.importing.headings.best_columns import NamedColumn, best_columns
 from fieldcal.importing.headings.heading import Column, HeadingMatch
+from fieldcal.importing.headings.numbered_axes import with_lettered_axes
 from fieldcal.importing.headings.repeated_names import with_distinct_names
 from fieldcal.importing.words.heading_units import UNITS
 from fieldcal.importing.words.heading_words import (
     MEAN,
-    REFERENCE,
     SCATTER,
-    HeadingMeaning,
     bare_axis,
     bare_label,
     heading_meaning,
     words_in_name,
 )
+from fieldcal.importing.words.sensor_words import AXES
 from fieldcal.importing.words.telephone_names import sign_of_ios
 from fieldcal.importing.words.thermometer_words import BESIDE_THERMOMETERS, FOREIGN
 
@@ -33,14 +33,12 @@ NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filte
                "covariance", "valid", "validity", "flag", "status")  # fmt: skip
 """Words of columns that are no samples of a sensor."""
 
-G_FORCE = (("g",), ("g", "force"))
-"""Words of ``gFx``: a program that writes it calls ``ax`` what has no gravity in it."""
-
-AXES = ("x", "y", "z")
-
 ROS = (("angular", "velocity"), ("linear", "acceleration"), ("ang", "vel"),
        ("lin", "acc"))  # fmt: skip
 """Words of the axes of ROS's sensor_msgs/Imu, which is defined in rad/s."""
+
+CLOCK_PARTS = ("t_h", "t_min")
+"""Kinds of columns that are added to the seconds of a clock."""
 
 OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "arrived",
                "log", "receive", "received", "recv", "reception", "rx",
@@ -50,13 +48,6 @@ OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "arri
 
 ANGLES = ("roll", "pitch", "yaw", "heading", "azimuth", "euler", "quat", "quaternion")
 """Words of what a filter computes of an attitude."""
-
-
-class NamedColumn(NamedTuple):
-    """Number of a column, and the meaning of its name."""
-
-    number: int
-    says: HeadingMeaning
 
 
 def match_headings(
@@ -71,18 +62,15 @@ def match_headings(
     weak : whether accelerations are taken that may lack gravity, with nothing beside
 
     """
-    columns = with_distinct_names(columns)
+    columns = with_distinct_names(with_lettered_axes(columns))
     named = [
         NamedColumn(i, said)
         for i, column in enumerate(columns)
         if "," not in column.place
         and (said := heading_meaning(column.name, column.unit)) is not None
-        and (said.kind == "t" or not set(said.label) & set(NOT_SAMPLES))
+        and (said.kind == "t" or not _is_no_sample(said.label))
     ]
-    named = _without_counts(
-        _without_angle_gains(_with_temperature(columns, _without_references(named)))
-    )
-    named = _without_linear_acceleration(named)
+    named = best_columns(columns, named)
     acc, gyr = _triads(named, "a"), _triads(named, "g")
     if acc is None or gyr is None:
         return ()
@@ -93,20 +81,42 @@ def match_headings(
     if not gyr and lacking and not weak:
         return ()
     times = _stamps([n for n in named if n.says.kind == "t"])
+    parts = [n for n in named if n.says.kind in CLOCK_PARTS]
     steps = [n for n in named if n.says.kind == "dt"][:1]
     apart = [n for n in named if n.says.kind == "l"]
+    rates = _rates_by_force(acc, gyr)
     found = []
     for label in acc or gyr:
-        both = [*acc.get(label, ()), *_gyroscopes_of(label, gyr)]
+        both = [*acc.get(label, ()), *(rates[label] if acc else gyr[label])]
         warm, says = _thermometer(named, label)
         rest = _plainest([n for n in named if n.says.kind == "seq"], ())
         rest += [n for n in named if n.says.kind == "t_host"][:1]
-        clock = _plainest(_columns_of_imu(times, label) or times, OTHER_CLOCK) or steps
-        chosen = [*clock, *both, *apart, *warm, *rest]
+        clock = _plainest(_columns_of_imu(times, label) or times, OTHER_CLOCK)
+        clock = [_nearest_before(clock[0], times, both, columns)] if clock else steps
+        chosen = [*clock, *parts, *both, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
+    if left := [three for three in gyr.values() if acc and three not in rates.values()]:
+        told = _left_out([columns[n.number].name for n in left[0]])
+        found[0] = replace(found[0], says=(*found[0].says, told))
     if len(found) == 1:
         found = [replace(found[0], name="0")]
     return tuple(found)
+
+
+def match_beside(columns: Sequence[Column], skip: str = "") -> HeadingMatch | None:
+    """Match times and the thermometer, where no name says an axis; None of others."""
+    found = [(i, heading_meaning(c.name, c.unit)) for i, c in enumerate(columns)]
+    named = [NamedColumn(i, said) for i, said in found if said is not None]
+    times = _stamps([n for n in named if n.says.kind == "t"])
+    parts = [n for n in named if n.says.kind in CLOCK_PARTS]
+    warm, says = _thermometer(named, ())
+    chosen = [*_plainest(times, OTHER_CLOCK), *parts, *warm]
+    return _match(columns, chosen, skip, "0", says) if chosen else None
+
+
+def _left_out(names: Sequence[str]) -> str:
+    """Say that rates are taken of no IMU."""
+    return f"{', '.join(names)}: go with no accelerometers by their names; left out"
 
 
 def columns_without_axes(columns: Sequence[Column]) -> list[int]:
@@ -146,71 +156,6 @@ def _match_thermometer_file(
     return (_match(columns, [*clock, *chosen], skip, "0", says),)
 
 
-def _with_temperature(
-    columns: Sequence[Column], named: Sequence[NamedColumn]
-) -> list[NamedColumn]:
-    """Columns with "T" taken as temperature if another column is the time."""
-    times = [n for n in named if n.says.kind == "t"]
-    warm = [n for n in times if columns[n.number].name.strip() == "T"]
-    if not warm or len(times) == len(warm):
-        return [*named]
-    as_warm = [n._replace(says=HeadingMeaning("temperature", "", None)) for n in warm]
-    return [n for n in named if n not in warm] + as_warm
-
-
-def _without_references(named: Sequence[NamedColumn]) -> list[NamedColumn]:
-    """Columns without reference values, if there are measured ones."""
-    ought = [n for n in named if set(n.says.label) & set(REFERENCE)]
-    outputs = {n.says.kind for n in named if n not in ought}
-    return [n for n in named if n not in ought or n.says.kind not in outputs]
-
-
-def _without_angle_gains(named: Sequence[NamedColumn]) -> list[NamedColumn]:
-    """Columns without increments of angle, if there are rates."""
-    rates = [n for n in named if n.says.kind == "g"]
-    gains = [n for n in rates if n.says.weak]
-    return [n for n in named if n not in gains or len(gains) == len(rates)]
-
-
-def _without_counts(named: Sequence[NamedColumn]) -> list[NamedColumn]:
-    """Columns without counts of axes that are also given in units."""
-    axes = [n for n in named if n.says.axis and n.says.kind in "ag"]
-    in_units = {_axis_of(n) for n in axes if n.says.unit}
-    return [
-        n for n in named
-        if n not in axes or n.says.unit or _axis_of(n) not in in_units
-        or "raw" not in n.says.label
-    ]  # fmt: skip
-
-
-def _axis_of(one: NamedColumn) -> tuple[str, str, tuple[str, ...]]:
-    """Kind, axis and IMU of a column."""
-    return one.says.kind, one.says.axis, bare_label(one.says.label)
-
-
-def _without_linear_acceleration(named: Sequence[NamedColumn]) -> list[NamedColumn]:
-    """Columns without accelerations less gravity, if there are specific forces.
-
-    Where gravity stands in columns of its own, both together are what was measured.
-    """
-    forces = [n for n in named if n.says.kind == "a"]
-    if whole := [n for n in forces if n.says.label in G_FORCE]:
-        named = [n for n in named if n in whole or n not in forces]
-        forces = whole
-    weak = [n for n in forces if n.says.weak]
-    gravity = [n for n in named if n.says.kind == "v"]
-    others = [n for n in named if n not in weak and n not in gravity]
-    if len(weak) < len(forces):
-        return others
-    axes = [sorted(n.says.axis for n in three) for three in (weak, gravity)]
-    if axes != [[*AXES]] * 2 or weak[0].says.unit != gravity[0].says.unit:
-        return others + weak
-    both = ((gravity, "a"), (weak, "l"))
-    parts = [NamedColumn(n.number, n.says._replace(kind=kind, label=(), weak=False))
-             for three, kind in both for n in three]  # fmt: skip
-    return others + parts
-
-
 def _triads(
     named: Iterable[NamedColumn], kind: str
 ) -> dict[tuple[str, ...], list[NamedColumn]] | None:
@@ -236,11 +181,45 @@ def _triads(
     return groups
 
 
-def _gyroscopes_of(
-    label: tuple[str, ...], gyr: Mapping[tuple[str, ...], list[NamedColumn]]
-) -> list[NamedColumn]:
-    """Gyroscopes of an IMU: those with its label, or the only ones."""
-    return gyr.get(label) or (next(iter(gyr.values())) if len(gyr) == 1 else [])
+def _rates_by_force(
+    acc: Mapping[tuple[str, ...], list[NamedColumn]],
+    gyr: Mapping[tuple[str, ...], list[NamedColumn]],
+) -> dict[tuple[str, ...], list[NamedColumn]]:
+    """Gyroscopes of each IMU, by the label of its accelerometers.
+
+    Those with its label, the only ones, or those that share the most words with it.
+    """
+    found = {}
+    for label in acc:
+        shared = {own: len({*own} & {*label}) for own in gyr if own not in acc}
+        best = [own for own, many in shared.items() if many == max(shared.values())]
+        alike = len(best) == 1 and shared[best[0]]
+        only = next(iter(gyr)) if len(gyr) == 1 else best[0] if alike else label
+        found[label] = gyr.get(label) or gyr.get(only) or []
+    return found
+
+
+def _nearest_before(
+    clock: NamedColumn,
+    times: Sequence[NamedColumn],
+    axes: Sequence[NamedColumn],
+    columns: Sequence[Column],
+) -> NamedColumn:
+    """The time that stands next before the first axis, of those that are called alike.
+
+    Programs that write a time before each channel write one for each of their rates.
+    """
+    first = min(n.number for n in axes)
+    name = columns[clock.number].name
+    alike = [n for n in times if columns[n.number].name == name and n.number < first]
+    return max(alike, key=lambda n: n.number, default=clock)
+
+
+def _is_no_sample(label: Sequence[str]) -> bool:
+    """Whether the words of a column say that it holds no samples of a sensor."""
+    # one of low noise is a sensor
+    quiet = {"noise"} if "low" in label else set()
+    return bool(({*label} - quiet) & {*NOT_SAMPLES})
 
 
 def _columns_of_imu(
@@ -313,6 +292,7 @@ def _match(
     reversed_ = frozenset(n.says.kind + n.says.axis for n in forces if turned)
     says = (*says, told) if told else says
     axes = [words_in_name(columns[n.number].name) for n in chosen if n.says.axis]
-    ros = all(any({*part} <= {*words} for part in ROS) for words in axes)
+    ros = bool(axes) and all(any({*part} <= {*words} for part in ROS) for words in axes)
     usual = "rad/s" if ros else ""
-    return HeadingMatch(tuple(found), units, name, says, usual, reversed_)
+    free = any(n.says.kind == "a" and n.says.weak and not n.says.gain for n in chosen)
+    return HeadingMatch(tuple(found), units, name, says, usual, reversed_, free)

@@ -14,7 +14,8 @@ from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.words.heading_units import parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 
-_BRACKETED = re.compile(r"(.*?)\s*[\[(](\w{2,})[\])]\s*")
+_BRACKETED = re.compile(r"(.*?)\s*[\[(](?![xyzXYZ][\])])(\w[\w ]*)[\])]\s*")
+"""A name with more in brackets than its axis."""
 
 
 def with_distinct_names(columns: Sequence[Column]) -> list[Column]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from fieldcal.importing.headings.heading import Column, Heading
 from fieldcal.importing.words.heading_words import heading_meaning
-
-AXES = ("x", "y", "z")
+from fieldcal.importing.words.sensor_words import AXES
 
 
 def of_sensor(sensor: str, column: Column) -> Column:

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.importing.words.sensor_words import AXES
+
 MARK = b"\xa3\x95"
 FMT = 128
 FMT_SIZE = 89
@@ -22,8 +24,6 @@ INSTANCES = {"IMU": 0, "IMU2": 1, "IMU3": 2}
 
 HEAD, BODY = "ISBH", "ISBD"
 """Messages of batches of samples: what they are, and the samples."""
-
-AXES = ("x", "y", "z")
 
 PART_SAMPLES = 32
 """Samples of a part of a batch."""

@@ -19,8 +19,7 @@ from fieldcal.importing.words.heading_words import (
     heading_meaning,
     words_in_name,
 )
-
-AXES = "xyz"
+from fieldcal.importing.words.sensor_words import AXES
 
 DEEPEST = 20
 """Records within records that are looked at."""

@@ -21,8 +21,7 @@ from fieldcal.importing.times.alignment import nearest_in_time
 from fieldcal.importing.times.gravity_sum import lacks_gravity
 from fieldcal.importing.words.file_names import best_name, part_of_force
 from fieldcal.importing.words.heading_words import heading_meaning, words_in_name
-
-AXES = ("x", "y", "z")
+from fieldcal.importing.words.sensor_words import AXES
 
 Fields = Mapping[str, Array]
 """Values (n,) of each field of records of one kind."""

@@ -29,7 +29,7 @@ from fieldcal.importing.tables.column_times import (
     split_seconds,
 )
 from fieldcal.importing.times.repeats import NO_VALUES, distinct_rows
-from fieldcal.importing.times.row_times import FRACTIONS
+from fieldcal.importing.times.row_times import CLOCK_PARTS, FRACTIONS
 from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.importing.units.time_units import (
     RATE_TOLERANCE,
@@ -189,7 +189,10 @@ class ColumnClock:
         used = [j for j in wanted_too if j < table.shape[1]]
         once = distinct_rows(table[:, used], table[:, i])
         table = table[once]
-        t = table[:, i]
+        t = table[:, i] + sum(
+            table[:, at[name]] * CLOCK_PARTS[name]
+            for name in CLOCK_PARTS.keys() & at.keys() - FRACTIONS.keys()
+        )
         if (value := constant_value(t)) is not None:
             raise InputError(
                 f"{self._of.path}: column t is {value:.10g} in all rows, so it is no"

@@ -34,11 +34,13 @@ from fieldcal.importing.units.scales import (
 )
 from fieldcal.importing.units.time_units import usual_step
 from fieldcal.importing.words.heading_words import heading_meaning, is_counter
+from fieldcal.importing.words.sensor_words import AXES
 
 GROWS = 0.999
 """Share of steps of a time that are positive: a line may be damaged."""
 
-AXES = "xyz"
+RATES = ("p", "q", "r")
+"""What those who fly call rates about x, y and z."""
 
 NOISY = 0.1
 """Part of gravity that its own noise is not."""
@@ -202,12 +204,17 @@ def _axis_triples(free: Sequence[int], names: Sequence[str]) -> list[Three]:
 
 def _by_name(free: Sequence[int], names: Sequence[str]) -> list[Three]:
     """Columns that are three axes, by the words that their names share."""
-    stems: dict[str, dict[str, int]] = {}
-    for i in free:
-        if matched := re.fullmatch(r"(.*?)[_ .]?([xyz])(\W.*|)", names[i].lower()):
-            stem = f"{matched.group(1)}|{matched.group(3)}"
-            stems.setdefault(stem, {})[matched.group(2)] = i
-    return [(s["x"], s["y"], s["z"]) for s in stems.values() if len(s) == len(AXES)]
+    found: list[Three] = []
+    for letters in (AXES, RATES):
+        stems: dict[str, dict[str, int]] = {}
+        form = re.compile(rf"(.*?)[_ .]?([{''.join(letters)}])(\W.*|)")
+        for i in free:
+            if matched := form.fullmatch(names[i].lower()):
+                stem = f"{matched.group(1)}|{matched.group(3)}"
+                stems.setdefault(stem, {})[matched.group(2)] = i
+        x, y, z = letters
+        found += [(s[x], s[y], s[z]) for s in stems.values() if len(s) == len(letters)]
+    return found
 
 
 def _force_and_rate_triples(

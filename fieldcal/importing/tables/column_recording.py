@@ -33,6 +33,7 @@ from fieldcal.importing.recording import (
 )
 from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, column_numbers
+from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
 from fieldcal.importing.tables.means import scatter_columns
@@ -148,7 +149,8 @@ class ColumnRecording(Recording):
         way = next((w for found, w in ways if found and found is named), None)
         thermometer = bool(named) and not _channels(named[0]) & {"ax", "gx"}
         if len(named) < 2 and not (thermometer or _is_complete(named)):
-            told = self._told(named, way or next((w for _, w in ways), None))
+            beside = () if named else _beside(checked, table)
+            told = self._told(named or beside, way or next((w for _, w in ways), None))
             if told is not None:
                 return {"0": told}
             self._say_unnamed(named, way)
@@ -171,13 +173,21 @@ class ColumnRecording(Recording):
         width = self.beginning().shape[1]
         for way in self.heading():
             if len(way.columns) == width:
-                units = units_over(way.columns, at)
-                with_them = with_units(wanted, units)
+                with_them = self._with_units_over(wanted, way, at)
                 if with_them != wanted:
-                    options = " ".join(unit_options(wanted, with_them))
-                    self.says.append(f"taken from {NAMES}: {options}")
                     return with_them
         return wanted
+
+    def _with_units_over(
+        self, wanted: ReadOptions, way: Heading, at: Mapping[str, int]
+    ) -> ReadOptions:
+        """Options with the units that stand over channels in numbered columns."""
+        with_them = with_units(wanted, units_over(way.columns, at))
+        if with_them != wanted:
+            options = " ".join(unit_options(wanted, with_them))
+            said = f"taken from {NAMES}: {options}"
+            self.says += [said] if said not in self.says else []
+        return with_them
 
     def _told(
         self, named: Sequence[HeadingMatch], way: Heading | None
@@ -205,7 +215,11 @@ class ColumnRecording(Recording):
         said = ",".join(with_signs(chosen, wanted.reversed))
         self.guessed["columns"] = f"{said}: {told.why}"
         self.says += [s for one in named[:1] for s in one.says if s not in self.says]
-        return replace(wanted, columns=chosen)
+        wanted = replace(wanted, columns=chosen)
+        if way is None or len(way.columns) != k:
+            return wanted
+        at = {channel: i for i, channel in told.channels.items()}
+        return self._with_units_over(wanted, way, at)
 
     def _say_unnamed(self, named: Sequence[HeadingMatch], way: Heading | None) -> None:
         """Ask about axes that no name says where none are the accelerometers.
@@ -239,6 +253,23 @@ class ColumnRecording(Recording):
             f" {quote(with_them)} if they are, or --columns"
             f" {quote(','.join(_columns_option(known, places, way.skip)))}"
         )
+
+
+def _beside(ways: Sequence[Heading], table: Array) -> tuple[HeadingMatch, ...]:
+    """Time and thermometer by the first heading of a table (n, k) that names no axis.
+
+    What only counts the rows is left to the question for the rate.
+    """
+    for way in ways:
+        if len(way.columns) == table.shape[1]:
+            counts = [is_row_counter(column) for column in table.T]
+            names = [
+                column._replace(name="") if counted else column
+                for column, counted in zip(way.columns, counts, strict=True)
+            ]
+            if (found := headings.match_beside(names, way.skip)) is not None:
+                return (found,)
+    return ()
 
 
 def _columns_of(table: Array, places: Mapping[str, int]) -> Array:

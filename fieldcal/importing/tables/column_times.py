@@ -12,7 +12,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
-from fieldcal.importing.times.row_times import FRACTIONS, NEAR_STEPS
+from fieldcal.importing.times.row_times import CLOCK_PARTS, FRACTIONS, NEAR_STEPS
 from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.scales import MIN_ROWS, counts_beside, rounded_text
@@ -165,8 +165,7 @@ def ask_rate_of_shared_times(wanted: ReadOptions, shared: SharedTimes, t: Array)
     """Ask for the rate where rows share times (n,), now more, now fewer."""
     unit = wanted.time_unit or next(iter(possible_time_units(t)), "s")
     rate = shared.rows / (shared.step * TIME_UNITS[unit])
-    named = [c for c in wanted.columns if not c.startswith("t=")]
-    names = [SKIP if name == "t" else name for name in named]
+    names = _without_times(wanted)
     return (
         f"its times step by {shared.step:g} {unit}, with about {shared.rows:.0f} rows"
         " in each, so they do not say when a row was taken: add --columns"
@@ -174,10 +173,19 @@ def ask_rate_of_shared_times(wanted: ReadOptions, shared: SharedTimes, t: Array)
     )
 
 
+def _without_times(wanted: ReadOptions) -> list[str]:
+    """Columns as ``--columns`` names them, without those of the time."""
+    pairs = [name.partition("=") for name in wanted.columns]
+    return [
+        SKIP if channel in ("t", *CLOCK_PARTS) else channel + sign + place
+        for channel, sign, place in pairs
+        if not (place and channel in ("t", *CLOCK_PARTS))
+    ]
+
+
 def ask_rate_of_counter(wanted: ReadOptions, table: Array) -> str:
     """Ask for the rate where the times only count the rows."""
-    names = [SKIP if name == "t" else name for name in wanted.columns
-             if not name.startswith("t=")]  # fmt: skip
+    names = _without_times(wanted)
     return (
         "its times grow by 1 from row to row, so they may count rows: add --columns"
         f" {quote(','.join(names))} --rate {rate_hint(wanted, table)}; or --time-unit s"

@@ -8,6 +8,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Heading
+from fieldcal.importing.tables.clock_columns import with_clock_columns
 from fieldcal.importing.tables.column_times import (
     grows_each_row,
     is_row_counter,
@@ -38,6 +39,7 @@ def with_checked_times(way: Heading, table: Array) -> Heading:
     table : (n, k) numbers of the first rows; nan where a cell is none
 
     """
+    way = with_clock_columns(way, table)
     way = _without_sums(_with_thermometer(way, table), table)
     said = [heading_meaning(column.name, column.unit) for column in way.columns]
     named = [i for i, one in enumerate(said) if one is not None and one.kind == "t"]
@@ -89,11 +91,16 @@ def _with_thermometer(way: Heading, table: Array) -> Heading:
     if table.shape[1] != len(kinds):
         return way
     names = [*way.columns]
-    warm = [
+    letters = [
         i for i, column in enumerate(names)
         if _LETTER.fullmatch(column.name.strip()) and not column.unit
-        and {"a", "g"} & {*kinds[:i]} and _is_warmth(table[:, i])
+        and {"a", "g"} & {*kinds[:i]}
     ]  # fmt: skip
+    warm = [i for i in letters if _is_warmth(table[:, i])]
+    if len(letters) == 1 and not warm and not keeps_growing(table[:, letters[0]]):
+        # what goes up and down is no time: a thermometer in counts
+        names[letters[0]] = names[letters[0]]._replace(name="temperature")
+        return Heading(names, way.skip)
     alone = len(warm) == 1 and "temperature" not in kinds
     for i in warm:
         own = {"unit": CELSIUS} if alone else {"name": ""}

@@ -8,8 +8,7 @@ from typing import Self
 
 from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
-
-AXES = ("x", "y", "z")
+from fieldcal.importing.words.sensor_words import AXES
 
 _RULE = re.compile(r"[\s|:+-]*")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from fieldcal.importing.text.tagged_lines import SENSORS
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
 
 NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "addr",
@@ -56,6 +57,30 @@ class ImuInstances(NamedTuple):
         """What the user must know, a sentence each."""
         return [f"{name} holds only zeros: it is left out" for name in self.silent]
 
+    def over(self, pieces: Iterable[Sequence[str]]) -> ImuInstances:
+        """The same by a whole file, in which one of them may come late.
+
+        Parameters
+        ----------
+        pieces : its lines, some at a time
+
+        """
+        many: Counter[str] = Counter()
+        live: set[str] = set()
+        for lines in pieces:
+            for line in lines:
+                row = line.split(self.separator)
+                if len(row) <= self.column:
+                    continue
+                name = row[self.column].strip().strip('"')
+                many[name] += 1
+                if name not in live and _moves(row[self.column + 1 :]):
+                    live.add(name)
+        late = [n for n in many if n in live and many[n] >= MIN_ROWS]
+        names = dict.fromkeys((*self.names, *late))
+        silent = tuple(name for name in self.silent if name not in names)
+        return self._replace(names=tuple(names), silent=silent)
+
     def only(self, name: str, lines: Sequence[str]) -> list[str]:
         """Lines of one IMU, and those that are none of any."""
         return [line for line in lines if self._cell(line) in (name, None)]
@@ -83,7 +108,7 @@ def find_instances(lines: Sequence[str], separator: str | None) -> ImuInstances 
         column = [row[i] for row in numbers]
         named = any(tells_devices(row[i]) for row in above)
         words = not any(is_number(cell, False) for cell in column)
-        if (named or words) and _in_turn(column):
+        if (named or words) and _in_turn(column) and not _are_sensors(column):
             names = dict.fromkeys(column)
             zeros = [name for name in names if _is_silent(numbers, i, name)]
             silent = zeros if len(zeros) < len(names) else []
@@ -96,6 +121,18 @@ def tells_devices(name: str) -> bool:
     """Whether a name is that of a column or field that identifies devices."""
     bare = re.sub(r"[\s_.-]+", "", name.lower().lstrip("#%/ "))
     return bare in NAMES or (bare.endswith("id") and bare[:-2] in NAMES)
+
+
+def _are_sensors(column: Sequence[str]) -> bool:
+    """Whether cells name the two sensors of one IMU."""
+    words = {*column}
+    return all(any(SENSORS[kind].search(w) for w in words) for kind in ("a", "g"))
+
+
+def _moves(cells: Sequence[str]) -> bool:
+    """Whether cells of a row hold numbers of axes that are there."""
+    numbers = [float(cell) for cell in cells if is_number(cell, False)]
+    return len(numbers) >= FEWEST_COLUMNS and sum(map(bool, numbers)) > 1
 
 
 def _is_silent(rows: Sequence[Sequence[str]], i: int, name: str) -> bool:

@@ -23,11 +23,10 @@ from functools import lru_cache
 from fieldcal.importing.text.log_prefixes import STAMP, TICKS, TIME, log_prefix
 from fieldcal.importing.words.heading_units import parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
+from fieldcal.importing.words.sensor_words import AXES
 
 CLOCKS = frozenset((TIME, TICKS, STAMP))
 """Names that each line of a row may have."""
-
-AXES = ("x", "y", "z")
 
 MIN_LABEL_SHARE = 0.5
 """Share of the commonest label's lines in which others are no column."""

@@ -4,6 +4,7 @@
 [00:00:12.345,678] <inf> imu: ax=0.1                     Zephyr
 [00012345] <inf> imu: ax=0.1                             Zephyr, ms since the start
 05-03 14:20:31.123  1234  1250 D Imu: ax=0.1             Android's logcat
+[   123] ax=0.1
 [12.345] imu: ax=0.1        1700000000.123 [INFO] ax=0.1        12345 ms | ax=0.1
 """
 
@@ -21,6 +22,9 @@ TICKS = "time [ms]"
 STAMP = "time [s]"
 """Name of the seconds that a program writes before a line."""
 
+COUNT = "time"
+"""Name of a number in brackets: ticks, or rows."""
+
 _FORMS = {
     STAMP: (
         r"\s*\[\s*(?:DEBUG|INFO|WARN(?:ING)?|ERROR|FATAL)\s*\]\s*\[(\d+\.\d+)\]()"
@@ -37,6 +41,7 @@ _FORMS = {
         r"\s*\[(\d{8,})\]()\s*<\w+>\s*[\w.-]+:\s*",
         r"\s*(\d+)() ?ms\b[\s:|,-]+(?=[A-Za-z])",
     ),
+    COUNT: (r"\s*\[\s*(\d+)\]():?\s*(?=[A-Za-z])",),
 }
 """Forms by the name of the time in them, which is in two parts."""
 

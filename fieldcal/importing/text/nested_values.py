@@ -16,14 +16,15 @@ from typing import NamedTuple, Self
 
 from fieldcal.importing.text.labels import (
     ARRIVAL,
-    AXES,
     LEVEL,
     LONGEST,
     labelled_values,
 )
 from fieldcal.importing.text.log_prefixes import log_prefix
 from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
+from fieldcal.importing.text.text_lines import MISSING
 from fieldcal.importing.words.heading_words import heading_meaning
+from fieldcal.importing.words.sensor_words import AXES
 
 FEWEST = 3
 """Values of a line: the axes of a sensor."""
@@ -171,7 +172,9 @@ class _Reader:
         unit = ""
         while (one := self._next())[0] not in ("close", "end"):
             kind, name = one
-            inner = names
+            inner, of_type = names, False
+            if name in MISSING and self._tokens[self._at][0] != "is":
+                kind = "number"
             if kind == "word":
                 is_name = self._tokens[self._at][0] == "is"
                 if is_name:
@@ -184,14 +187,17 @@ class _Reader:
                     name = text
                 elif _tell([f"{name} x"]):
                     inner = (*names, name)
-                if kind == "word":
-                    self.typed = True
+                if of_type := kind == "word":
                     kind = self._next()[0]
             if kind == "number":
+                self.typed |= of_type
                 bare += [len(found)] if inner == names else []
                 found.append(NestedValue("_".join(inner), "", name))
             elif kind == "open" and depth < MOST_DEEP:
-                found += self.group(inner, depth + 1)
+                within = self.group(inner, depth + 1)
+                # the address of a device in brackets is no value
+                self.typed |= of_type and bool(within)
+                found += within
             else:
                 raise ValueError(f"{kind} in a line of values")
         if (one[0] == "end") != (depth == 0):

@@ -21,7 +21,11 @@ from fieldcal.importing.text.nearest_lines import NearestLines
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
 from fieldcal.importing.words.heading_units import parse_unit
-from fieldcal.importing.words.heading_words import heading_meaning
+from fieldcal.importing.words.heading_words import (
+    bare_axis,
+    heading_meaning,
+    words_in_name,
+)
 
 SENSORS = {
     "a": re.compile(r"acc", re.IGNORECASE),
@@ -30,8 +34,8 @@ SENSORS = {
 }
 """What the word of a kind holds, by what its lines hold."""
 
-OTHER_QUANTITY = re.compile(r"lin|user|free|magn", re.IGNORECASE)
-"""What it holds if they lack gravity or are of another sensor."""
+OTHER_QUANTITY = re.compile(r"lin|user|free|magn|vector", re.IGNORECASE)
+"""What it holds if they lack gravity, are of another sensor or an attitude."""
 
 PLACES = 3
 """Columns at the beginning of which one is the word, or else the last."""
@@ -103,7 +107,7 @@ class TaggedLines(TextForm):
             return None
         here = [row for row in rows if len(row) == acc.width and row[place] == acc.word]
         time = next((i for i in range(acc.width) if _grows(row[i] for row in here)), -1)
-        if gyr is not None and time < 0:
+        if gyr is not None and (time < 0 or _are_apart(rows, place, (acc, gyr), time)):
             return None
         return cls(parted, place, acc, gyr, time)
 
@@ -136,6 +140,28 @@ class TaggedLines(TextForm):
     def _of_gyroscope(self, row: Sequence[str]) -> list[str]:
         """Cells of a line of the gyroscope, but its word and time."""
         return [c for i, c in enumerate(row) if i not in (self._place, self._time)]
+
+
+def _are_apart(
+    rows: Sequence[Sequence[str]],
+    place: int,
+    kinds: tuple[LineKind, LineKind],
+    time: int,
+) -> bool:
+    """Whether rows of two kinds have their numbers in columns of their own.
+
+    Such rows are those of one table, whose names say both sensors.
+    """
+    if kinds[0].width != kinds[1].width:
+        return False
+    filled: list[set[int]] = [set(), set()]
+    for row in rows:
+        for kind, columns in zip(kinds, filled, strict=True):
+            if len(row) == kind.width and row[place] == kind.word:
+                columns |= {i for i, c in enumerate(row) if is_number(c, False)}
+    blank = [{i for i in range(kinds[0].width) if i != time} - one for one in filled]
+    own = (filled[0] & blank[1], filled[1] & blank[0])
+    return min(map(len, own)) >= len("xyz")
 
 
 def _is_word(rows: Sequence[Sequence[str]], i: int) -> bool:
@@ -201,7 +227,7 @@ def _chosen(kinds: Sequence[LineKind]) -> tuple[LineKind | None, LineKind | None
 
 def _named(kind: LineKind, sensor: str) -> tuple[str, ...]:
     """Names of the columns of a kind, bare axes with their sensor."""
-    bare = [name.lower() in ("x", "y", "z") for name in kind.names]
+    bare = [bare_axis(words_in_name(name)) is not None for name in kind.names]
     said = [heading_meaning(name) for name in kind.names]
     if not any(bare) and not any(s and s.kind in "ag" for s in said):
         return ()

@@ -16,6 +16,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
     23:59:50.7, 0.1, 0.2               ms behind the seconds without their zeros: 50.007
 
+    1,0.01,0.1,0.2,9.8                 a number for the sensor, by what stands above
     0.981D+01  9.81 m/s²               numbers as Fortran writes them, or with units
     0.01,ax,0.12                       a line for each value; points of a database
 
@@ -46,6 +47,7 @@ from fieldcal.importing.text.nested_values import NestedValues
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.importing.text.scaled_counts import ScaledCounts
+from fieldcal.importing.text.sensor_codes import SensorCodes
 from fieldcal.importing.text.split_decimals import SplitDecimals
 from fieldcal.importing.text.tagged_lines import TaggedLines
 from fieldcal.importing.text.text_form import (
@@ -298,6 +300,7 @@ FORMS: tuple[type[TextForm], ...] = (
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, QuotedCells,
     FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, BarTable, ListCells,
-    SplitDecimals, TaggedLines, ArrivalPrefix, HexCells, BareFractions, ClockColumn,
+    SplitDecimals, SensorCodes, TaggedLines, ArrivalPrefix, HexCells, BareFractions,
+    ClockColumn,
 )  # fmt: skip
 """Forms in the order in which they are looked for."""

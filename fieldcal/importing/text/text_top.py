@@ -28,7 +28,7 @@ ABOVE = 4
 LATEST = 50
 """Lines below the first of numbers among which their names are looked for."""
 
-AXES = 3
+NARROWEST = 3
 """Fewest columns by which the width of a table is told."""
 
 FEWEST = 2
@@ -116,7 +116,7 @@ def first_numbers(lines: Sequence[str], separator: str | None) -> int:
     """Which of the lines is the first of numbers; how many there are if none is."""
     parted = [separator or find_separator(line) for line in lines]
     rows = [split_cells(line, s) for line, s in zip(lines, parted, strict=True)]
-    many = Counter(len(row) for row in rows if len(row) >= AXES)
+    many = Counter(len(row) for row in rows if len(row) >= NARROWEST)
     # a line into which another broke is wider than all others
     width = (
         max(many, key=lambda n: (many[n], n))
@@ -125,11 +125,13 @@ def first_numbers(lines: Sequence[str], separator: str | None) -> int:
     )
     for i, (row, s) in enumerate(zip(rows, parted, strict=True)):
         said = [cell for cell in row if cell]
-        if len(row) < min(AXES, width) or not said:
+        if len(row) < min(NARROWEST, width) or not said:
             continue
         numbers = sum(is_number(cell, s != ",") for cell in said)
-        wide = s is None or len(row) >= width - 1
-        if numbers > NUMBERS * len(said) and numbers >= min(AXES, width) and wide:
+        # one that lacks a cell, as a setting does, is no row by itself
+        alike = rows[i + 1 : i + 2] and len(rows[i + 1]) == len(row)
+        wide = s is None or len(row) >= width - bool(alike)
+        if numbers > NUMBERS * len(said) and numbers >= min(NARROWEST, width) and wide:
             return i
     return len(lines)
 
@@ -165,15 +167,40 @@ def count_top_lines(
 def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]:
     """Lines above the numbers, read as headings in several ways."""
     first = first_numbers(lines, separator)
-    tops = [line.lstrip("#%/ ") for line in lines[max(0, first - ABOVE) : first]]
+    below = next(iter(lines[first : first + 1]), "")
+    tops = [line.lstrip("#%/ ") for line in _above(lines[:first], below, separator)]
     # who listens before the device starts has rows above the names
     tops += [line for line in lines[first : first + LATEST] if _all_words(line)]
     rows = [
-        _DESCRIBED.findall(line) or split_cells(line, separator or find_separator(line))
+        _DESCRIBED.findall(line) or _names_above(line, below, separator)
         for line in tops
     ]
     found = [Heading(way, SKIP) for way in _ways(rows)]
     return [one for one in found if FEWEST <= len(one.columns) <= MOST_COLUMNS]
+
+
+def _above(lines: Sequence[str], below: str, separator: str | None) -> list[str]:
+    """Lines above the numbers that may name columns: the last, and those as wide.
+
+    Lines of marks, ``*DATA`` below ``*UNIT``, may stand between names and numbers.
+    """
+    parted = separator or find_separator(below)
+    width = len(split_cells(below, parted))
+    begin = len(lines) - ABOVE
+    return [
+        line for i, line in enumerate(lines)
+        if i >= begin or (width >= NARROWEST and parted is not None
+                          and len(split_cells(line, parted)) == width)
+    ]  # fmt: skip
+
+
+def _names_above(line: str, below: str, separator: str | None) -> list[str]:
+    """Cells of a line of names; a unit such as ``[-90;90]`` in one parts none."""
+    parted = separator or find_separator(below)
+    cells = split_cells(line, parted)
+    if parted is not None and len(cells) == len(split_cells(below, parted)):
+        return cells
+    return split_cells(line, separator or find_separator(line))
 
 
 def _all_words(line: str) -> bool:

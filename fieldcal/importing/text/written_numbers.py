@@ -7,9 +7,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Self
 
+from fieldcal.importing.text.labels import labelled_values
 from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
 from fieldcal.importing.words.heading_units import parse_unit
+from fieldcal.importing.words.heading_words import heading_meaning
 
 _DOUBLE = re.compile(r"(?<![\w.])([-+]?(?:\d+\.?\d*|\.\d+))[dD]([-+]?\d{1,3})(?![\w.])")
 _WITH_UNIT = re.compile(
@@ -59,7 +61,7 @@ class UnitCells(TextForm):
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if some columns have a unit in nearly all rows."""
         parted = separator or (find_separator(lines[-1]) if lines else None)
-        if not parted:
+        if not parted or _labelled(lines[-1]):
             return None
         rows = [split_cells(line, parted) for line in lines]
         width = len(rows[-1])
@@ -96,6 +98,12 @@ class UnitCells(TextForm):
             if name[:1].isalpha() and not re.search(r"[\[(]", name):
                 row[i] = f"{name} ({unit})"
         return self._separator.join(row)
+
+
+def _labelled(line: str) -> bool:
+    """Whether the values of a line have labels, which tell more than its cells."""
+    names = [heading_meaning(name) for name, _ in labelled_values(line)]
+    return any(one is not None and one.kind in ("a", "g") for one in names)
 
 
 def _unit_in(cell: str) -> str:

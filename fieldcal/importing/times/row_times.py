@@ -18,6 +18,9 @@ from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions, RowBatch
 FRACTIONS = {"t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9}
 """Columns that hold what is beyond the whole seconds of ``t``, and s in one of each."""
 
+CLOCK_PARTS = {"t_h": 3600.0, "t_min": 60.0, **FRACTIONS}
+"""Columns that are added to the seconds of ``t``, and s in one of each."""
+
 COUNTED = (2.0**16, 2.0**24, 2.0**32)
 """Where counters of a device begin again."""
 
@@ -177,7 +180,7 @@ class RowTimes:
         if self._wanted.time_unit == CLOCK_NUMBER:
             values = clock_numbers(values)
         t: Array = values * scale
-        for name, size in FRACTIONS.items():
+        for name, size in CLOCK_PARTS.items():
             if name in columns:
                 t = t + columns[name] * size
         known = np.flatnonzero(np.isfinite(t))

@@ -24,7 +24,7 @@ TURNED = 0.5
 """Turn of gravity that all of a recording must have for (1), rad: root of the sum of
 the squares of what it turns by in each half second. 45° within 1.2 s are as much."""
 
-_AGREES = 0.9
+AGREES = 0.9
 """Correlation of both sides of (1) from which on it is believed."""
 
 _ROUGHLY = 0.3
@@ -65,7 +65,7 @@ def estimate_rate_unit(
     turned : least turn of gravity, as of `TURNED`, rad
 
     """
-    sides = _Sides.of(t, acc, gyr, gravity)
+    sides = TurnSides.of(t, acc, gyr, gravity)
     if sides is None or sides.moved < turned**2 * sides.lag:
         return None
     left, right = sides.left.ravel(), sides.right.ravel()
@@ -76,7 +76,7 @@ def estimate_rate_unit(
         return None
     rough = power / both
     closes = closing_scale(sides.t, sides.up, sides.gyr, rough)
-    return rough if closes is None and agrees >= _AGREES else closes
+    return rough if closes is None and agrees >= AGREES else closes
 
 
 def turns_deny(t: Array, acc: Array, gyr: Array, gravity: GravityReading) -> bool:
@@ -87,7 +87,7 @@ def turns_deny(t: Array, acc: Array, gyr: Array, gravity: GravityReading) -> boo
     t, acc, gyr, gravity : as of `estimate_rate_unit`
 
     """
-    sides = _Sides.of(t, acc, gyr, gravity)
+    sides = TurnSides.of(t, acc, gyr, gravity)
     if sides is None or sides.moved < TURNED**2 * sides.lag:
         return False
     both = float(sides.left.ravel() @ sides.right.ravel())
@@ -144,7 +144,7 @@ def compare_turns(
     t, acc, gyr, gravity : as of `estimate_rate_unit`
 
     """
-    sides = _Sides.of(t, acc, gyr, gravity)
+    sides = TurnSides.of(t, acc, gyr, gravity)
     if sides is None:
         return None
     up = sides.up / np.maximum(np.linalg.norm(sides.up, axis=1), 0.1)[:, None]
@@ -171,7 +171,7 @@ def _rms_turn(turns: Array, many: int) -> float:
     return float(np.sqrt((mean**2).sum(axis=1).mean()))
 
 
-class _Sides(NamedTuple):
+class TurnSides(NamedTuple):
     """Both sides of (1), over each lag.
 
     Attributes
@@ -183,6 +183,7 @@ class _Sides(NamedTuple):
     t, up, gyr : (m,), (m, 3) of the rows that are known; the rates without their
         median, nan where one is at its rail
     usual : (3,) that median
+    steps : (m - 1,) s from row to row; nan where (1) does not hold
 
     """
 
@@ -195,6 +196,7 @@ class _Sides(NamedTuple):
     up: Array
     gyr: Array
     usual: Array
+    steps: Array
 
     @classmethod
     def of(
@@ -219,7 +221,7 @@ class _Sides(NamedTuple):
         turning = np.cross(up, gyr)
         swung = (np.abs(length - 1) > _SWUNG) | clipped
         steps[swung[1:] | swung[:-1]] = np.nan
-        right, angles = (_lagged_sums((x[1:] + x[:-1]) / 2 * steps[:, None], lag)
+        right, angles = (lagged_sums((x[1:] + x[:-1]) / 2 * steps[:, None], lag)
                          for x in (turning, gyr))  # fmt: skip
         left = up[lag:] - up[:-lag]
         told = np.isfinite(right).all(axis=1)
@@ -228,7 +230,7 @@ class _Sides(NamedTuple):
             return None
         moved = float((left**2).sum())
         gyr = np.where(clipped[:, None], np.nan, gyr)
-        return cls(left, right, angles, lag, moved, t, whole, gyr, usual)
+        return cls(left, right, angles, lag, moved, t, whole, gyr, usual, steps)
 
 
 def _at_rails(gyr: Array) -> NDArray[np.bool_]:
@@ -244,12 +246,13 @@ def _at_rails(gyr: Array) -> NDArray[np.bool_]:
     return rails
 
 
-def _lagged_sums(steps: Array, lag: int) -> Array:
-    """Sums of `lag` successive steps (n, 3); nan over a pause."""
+def lagged_sums(steps: Array, lag: int) -> Array:
+    """Sums of `lag` successive steps (n, k); nan over a pause."""
     paused = np.isnan(steps)
     total = np.cumsum(np.where(paused, 0.0, steps), axis=0)
     gaps = np.cumsum(paused, axis=0)
-    total, gaps = (np.vstack([np.zeros((1, 3)), x]) for x in (total, gaps))
+    first = np.zeros((1, steps.shape[1]))
+    total, gaps = (np.vstack([first, x]) for x in (total, gaps))
     sums: Array = total[lag:] - total[:-lag]
     sums[(gaps[lag:] > gaps[:-lag]).any(axis=1)] = np.nan
     return sums

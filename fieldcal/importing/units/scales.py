@@ -113,6 +113,24 @@ GYR_SCALES = (
 )
 
 
+BESIDE_CENTI = Scale(16 * 180 / np.pi, "deg/s", 16.0)
+"""Counts of rates beside forces in cm/s^2, as the BNO055 by Bosch gives both (its data
+sheet, register UNIT_SEL): 2 % less than those of a full scale of 2000 deg/s."""
+
+
+def rate_scales(acc_unit: str) -> tuple[Scale, ...]:
+    """Units and counts that rates may be in beside forces in a unit.
+
+    >>> [s.lsb for s in rate_scales(CENTI) if 16 <= s.lsb < 17]
+    [16.0]
+    """
+    if acc_unit != CENTI:
+        return GYR_SCALES
+    near = np.log(GYR_OUT[0] + 1)
+    others = (s for s in GYR_SCALES if abs(np.log(s.lsb / BESIDE_CENTI.lsb)) > near)
+    return (*others, BESIDE_CENTI)
+
+
 def gain_scales(step: float, unit: str, size: float = 1.0) -> tuple[Scale, ...]:
     """Scales of increments over a step, such as those of velocity.
 

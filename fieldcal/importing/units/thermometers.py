@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,34 +39,62 @@ def is_usual_temperature(celsius: float) -> bool:
     return USUAL[0] <= celsius <= USUAL[1]
 
 
-_THERMOMETERS = ((256.0, 25.0), (340.0, 36.53), (333.87, 21.0))
-"""Counts in 1 K, and deg C at count 0, of the usual sensors."""
+class Thermometer(NamedTuple):
+    """Counts of a sensor's thermometer.
+
+    Attributes
+    ----------
+    lsb : counts in 1 K
+    zero : deg C at count 0
+    chips : that count so
+
+    """
+
+    lsb: float
+    zero: float
+    chips: str
 
 
-ANALOG_THERMOMETERS = ((10.0, 0.0), (1 / 0.00565, 25.0), (1 / 0.07386, 31.0),
-                       (1 / 0.14, 25.0))  # fmt: skip
-"""Likewise of the sensors of Analog Devices: ADIS1647x and 1650x, 1648x and 1649x,
-16448, and 1640x."""
+THERMOMETERS = (
+    Thermometer(256.0, 25.0, "LSM6DSL, LSM6DSO, ISM330"),
+    Thermometer(340.0, 36.53, "MPU-6000, MPU-6050"),
+    Thermometer(333.87, 21.0, "MPU-9250, ICM-20948"),
+    Thermometer(132.48, 25.0, "ICM-42688"),
+    Thermometer(512.0, 23.0, "BMI160, BMI270"),
+)
+"""Those of the usual sensors, by their data sheets."""
+
+ANALOG_THERMOMETERS = (
+    Thermometer(10.0, 0.0, "ADIS1647x, ADIS1650x"),
+    Thermometer(1 / 0.00565, 25.0, "ADIS1648x"),
+    Thermometer(1 / 0.0125, 25.0, "ADIS16495, ADIS16497"),
+    Thermometer(1 / 0.014285, 25.0, "ADIS16490"),
+    Thermometer(1 / 0.07386, 31.0, "ADIS16448"),
+    Thermometer(1 / 0.14, 25.0, "ADIS1640x"),
+)
+"""Likewise of the sensors of Analog Devices."""
 
 
 def temperature_counts(
     low: float,
     high: float,
-    thermometers: Sequence[tuple[float, float]] = _THERMOMETERS,
+    thermometers: Sequence[Thermometer] = THERMOMETERS,
 ) -> list[str]:
     """Options that make deg C of counts from `low` to `high`, as the usual sensors do.
 
     >>> temperature_counts(65236, 65240)[0]
-    '--temp-unit count --temp-lsb 256 --temp-zero -231 (23.8 to 23.8 deg C)'
+    '--temp-unit count --temp-lsb 256 --temp-zero -231 (LSM6DSL, LSM6DSO, ISM330: \
+23.8 to 23.8 deg C)'
     """
     wrapped = 2**16 if low >= 2**15 else 0
     found = []
-    for lsb, zero in thermometers:
+    for lsb, zero, chips in thermometers:
         coldest, warmest = (zero + (n - wrapped) / lsb for n in (low, high))
         if -45 <= coldest and warmest <= 105:
             found.append(
                 f"--temp-unit count --temp-lsb {lsb:.6g} --temp-zero"
-                f" {zero - wrapped / lsb:.6g} ({coldest:.1f} to {warmest:.1f} deg C)"
+                f" {zero - wrapped / lsb:.6g} ({chips}: {coldest:.1f} to"
+                f" {warmest:.1f} deg C)"
             )
     return found or [
         "--temp-unit count --temp-lsb 256 --temp-zero 25 (counts in 1 K, deg C at count"

@@ -13,6 +13,7 @@ from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.units.gravity_size import GravityReading, estimate_gravity
 from fieldcal.importing.units.rate_size import compare_turns, estimate_rate_unit
 from fieldcal.importing.units.scales import ACC_SCALES, GYR_SCALES, Scale, rounded_text
+from fieldcal.importing.units.turned_axes import NamedColumns
 from fieldcal.importing.units.unit_answers import zero_options
 from fieldcal.session.units import UNSCALED
 
@@ -96,11 +97,19 @@ class StatedUnits:
     name : of the recording
     said : units, those that were guessed included
     guessed : quantities of which they were
+    columns : in which the rates stand
 
     """
 
-    def __init__(self, name: str, said: ReadOptions, guessed: Container[str]) -> None:
+    def __init__(
+        self,
+        name: str,
+        said: ReadOptions,
+        guessed: Container[str],
+        columns: NamedColumns,
+    ) -> None:
         self._name, self._said, self._guessed = name, said, guessed
+        self._columns = columns
 
     def doubts(self, block: Block, gravity: GravityReading) -> list[str]:
         """What the user says and physics does not, a sentence each.
@@ -143,7 +152,8 @@ class StatedUnits:
             return []
         turned = estimate_rate_unit(block.t, block.acc, block.gyr, gravity)
         if turned is None:
-            return self._of_calm(block, gravity)
+            odd = self._columns.doubts(block.t, block.acc, block.gyr, gravity)
+            return odd or self._of_calm(block, gravity)
         if abs(np.log(turned)) <= MAX_LOG_SCALE:
             return []
         fits = _within(turned / self._said.gyr_scale, GYR_SCALES)

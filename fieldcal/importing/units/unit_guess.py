@@ -31,10 +31,10 @@ from fieldcal.importing.units.scales import (
     ACC_SCALES,
     ANALOG,
     GYR_OUT,
-    GYR_SCALES,
     MIN_ROWS_ALONE,
     fitting_scales,
     gain_scales,
+    rate_scales,
     rounded_text,
 )
 from fieldcal.importing.units.thermometers import (
@@ -48,6 +48,7 @@ from fieldcal.importing.units.time_units import (
     check_stated_times,
     usual_step,
 )
+from fieldcal.importing.units.turned_axes import NamedColumns
 from fieldcal.importing.units.unit_answers import (
     rate_options,
     scales_of_decimals,
@@ -104,7 +105,8 @@ def settle_units(recording: Recording, stream: str) -> AssumedUnits:
         check_format_units(recording, block)
         return AssumedUnits(heard.guessed)
     alone = len(parts) == 1
-    guess = _Guess(str(recording.path), _stated_units(parts), block, alone)
+    said, columns = _stated_units(parts), _columns_of_rates(parts)
+    guess = _Guess(str(recording.path), said, block, columns, alone)
     if guess.said.acc_unit not in UNSCALED and guess.acc_bias is None:
         check_one_unit(parts)
     for part in parts:
@@ -138,12 +140,24 @@ def _stated_units(parts: Sequence[Recording]) -> ReadOptions:
     return said
 
 
+def _columns_of_rates(parts: Sequence[Recording]) -> NamedColumns:
+    """Columns in which the rates stand, of the file that has them."""
+    channels = [[c.partition("=")[0] for c in part.wanted.columns] for part in parts]
+    pairs = zip(parts, channels, strict=True)
+    part = next((part for part, known in pairs if "gx" in known), parts[0])
+    wanted = part.wanted
+    return NamedColumns(
+        str(part.path), wanted.columns, wanted.reversed, part.columns_said
+    )
+
+
 class _Guess:
     """Units of the beginning of a recording.
 
     Parameters
     ----------
     name, said, block : of the recording, what is said of it, and its beginning
+    columns : in which the rates stand
     alone : whether it is one file: those of several may be in different units
 
     Attributes
@@ -156,9 +170,14 @@ class _Guess:
     """
 
     def __init__(
-        self, name: str, said: ReadOptions, block: Block, alone: bool = True
+        self,
+        name: str,
+        said: ReadOptions,
+        block: Block,
+        columns: NamedColumns,
+        alone: bool = True,
     ) -> None:
-        self._alone = alone
+        self._alone, self._columns = alone, columns
         self.found: dict[str, str] = {}
         self.acc_bias: list[float] | None = None
         self.doubts: list[str] = []
@@ -187,7 +206,7 @@ class _Guess:
         if not said.gyr_unit and said.gyr_lsb == 1:
             self._rates(block, gravity)
         if gravity:
-            said_units = StatedUnits(name, self.said, self.found)
+            said_units = StatedUnits(name, self.said, self.found, columns)
             self.doubts += said_units.doubts(block, gravity)
         if not said.temp_unit:
             self._temperature(block.temperature)
@@ -208,7 +227,7 @@ class _Guess:
     def _acceleration(self, gravity: GravityReading, acc: Array) -> None:
         fits = fitting_scales(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
         fits = scales_of_decimals(fits, acc)
-        if not fits and self._step:
+        if not fits and self._step and not self.said.free:
             scales = gain_scales(self._step, "m/s^2", G0)
             fits = fitting_scales(gravity.size, scales, ACC_OUT[not gravity.round])
         shows = f"|a| at rest is {rounded_text(gravity.size, 4)}"
@@ -261,9 +280,13 @@ class _Guess:
             return
         reads = gravity and estimate_rate_unit(block.t, block.acc, block.gyr, gravity)
         if reads is None or gravity is None:
+            if gravity is not None:
+                rows = block.t, block.acc, block.gyr
+                self.doubts += self._columns.doubts(*rows, gravity)
             self._calm(block, gyr, gravity)
             return
-        fits = fitting_scales(reads, GYR_SCALES, GYR_OUT[not gravity.round])
+        known = rate_scales(self.said.acc_unit)
+        fits = fitting_scales(reads, known, GYR_OUT[not gravity.round])
         fits = scales_of_decimals(fits, block.gyr)
         if self._gained:
             # who writes gains of velocity, writes gains of angle beside them

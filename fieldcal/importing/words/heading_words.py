@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from fieldcal.importing.words.heading_units import (
@@ -20,64 +20,21 @@ from fieldcal.importing.words.heading_units import (
     parse_unit,
     split_thermometer_name,
 )
+from fieldcal.importing.words.name_and_unit import name_unit_splits
 from fieldcal.importing.words.rate_names import with_axis_letter
-
-AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
-
-_SENSORS = {
-    "a": (
-        "a f acc accel accelerometer acceleration accs accl acce ac "
-        "beschleunigung aceleracion aceleracao accelerazione versnelling 加速度"
-    ).split(),
-    "g": (
-        "g w gyr gyro gyroscope gyros omega rate gy gyroskop giroscopio "
-        "drehrate winkelgeschwindigkeit 角速度 陀螺仪"
-    ).split(),
-    "m": "m mag magnetometer magnetic compass 磁场".split(),
-    "v": "gravity grav".split(),
-}
-_PHRASES = (
-    (("angular", "velocity"), "g"),
-    (("angular", "rate"), "g"),
-    (("angular", "vel"), "g"),
-    (("ang", "vel"), "g"),
-    (("rotation", "rate"), "g"),
-    (("gyro", "rotation"), "g"),
-    (("velocidad", "angular"), "g"),
-    (("specific", "force"), "a"),
-    (("rate", "of", "turn"), "g"),
-    (("linear", "acceleration"), "linear"),
-    (("linear", "accel"), "linear"),
-    (("accelerometer", "acceleration"), "a"),
+from fieldcal.importing.words.sensor_words import (
+    AXES,
+    AXIS,
+    BARE_STEPS,
+    GAINS,
+    PHRASES,
+    SENSORS,
+    SINCE,
+    STEPS,
+    TIMES,
+    WITHOUT_GRAVITY,
 )
-_GAINS = (
-    (("delta", "angle"), "g"),
-    (("delta", "theta"), "g"),
-    (("delta", "velocity"), "a"),
-    (("delta", "vel"), "a"),
-)
-"""Names of what angle and velocity gained since the row before."""
-
-_TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "sensortime",
-          "epoch", "epoc", "unixtime", "datetime", "zeit", "tiempo", "temps", "tempo",
-          "tijd", "时间", "sow", "tow")  # fmt: skip
-_SINCE = ("elapsed", "epoch", "uptime", "since", "start", "boot", "realtime",
-          "monotonic", "mono")  # fmt: skip
-"""Words of a time where a unit of time stands beside them."""
-
-_STEPS = (("dt",), ("delta", "t"), ("delta", "time"), ("time", "delta"), ("deltat",),
-          ("time", "step"), ("sample", "interval"))  # fmt: skip
-"""Names of the time that passed since the row before."""
-
-_BARE_STEPS = (("delta",), ("interval",))
-"""Likewise where a unit of time stands beside them."""
-
-_TEMPERATURES = ("temp", "temperature", "tmp", "temper", "temperatur", "temperatura",
-                 "温度")  # fmt: skip
-_WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world",
-                    "earth", "rotated", "est", "estimated")  # fmt: skip
-"""Words of accelerations that may lack gravity, lie in axes of the Earth, or are what a
-filter computes of others."""
+from fieldcal.importing.words.sensor_words import TEMPERATURES as THERMOMETER_NAMES
 
 SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "noise")
 """Words of columns that hold how much values scatter."""
@@ -98,8 +55,10 @@ COUNTERS = ("packet", "packets", "counter", "count", "cnt", "index", "idx", "num
             "id", "n")  # fmt: skip
 """Words of columns that count rows or messages."""
 
-_WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
-_FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
+_WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host", "t_h": "t_h",
+          "t_min": "t_min"}  # fmt: skip
+_FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated",
+            "rate", *AXIS)  # fmt: skip
 """Words that tell no IMU from another where all of one kind have them."""
 
 LONGEST = 300
@@ -108,15 +67,14 @@ LONGEST = 300
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+")
 _BRACKETS = re.compile(r"(.*?)\s*[\[({](.*)[\])}]\s*")
 _BRACKETED_AXIS = re.compile(r"[\[(]([xyzXYZ])[\])]")
-_CAPITAL = re.compile(r"(?<=[A-Za-z0-9])[A-Z]")
-_PER = re.compile("Per(?=[A-Z])")
 _BARE = re.compile("[\u0300-\u036f]")
 """Accents, once they are apart from their letters."""
 
-_INDEX = re.compile(r"(.+)(?:\[|\.0)([012])\]?")
-_INDEX_IN_UNIT = re.compile(r"(.+)\[([012])\]\s*\((.*)\)")
-"""Axes of an array: ``gyro_rad[0]``, ``gyroADC[0] (deg/s)``, or ``gyro_rad.00`` as
-PlotJuggler writes it."""
+_AXIS_SIGN = re.compile("[軸轴]")
+"""Axis, behind its letter: ``X軸加速度``."""
+
+_G_FORCE = re.compile(r"G\s?\(([xyzXYZ])\)")
+"""How programs that read cars call what a telephone feels."""
 
 
 class HeadingMeaning(NamedTuple):
@@ -129,6 +87,7 @@ class HeadingMeaning(NamedTuple):
     unit : None where none is said
     label : what else the name says, such as which IMU
     weak : whether something else may be meant
+    gain : whether it is what velocity or angle gained since the row before
 
     """
 
@@ -137,6 +96,7 @@ class HeadingMeaning(NamedTuple):
     unit: str | None
     label: tuple[str, ...] = ()
     weak: bool = False
+    gain: bool = False
 
 
 def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
@@ -148,15 +108,20 @@ def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
     unit : what the file says of it elsewhere, or nothing
 
     >>> heading_meaning("imu1_GyroX (dps)")
-    HeadingMeaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), weak=False)
+    HeadingMeaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), \
+weak=False, gain=False)
     """
     if len(name) > LONGEST:
         return None
     name = _BARE.sub("", unicodedata.normalize("NFD", name))
+    # signs of one syllable belong together again
+    name = _AXIS_SIGN.sub(" ", unicodedata.normalize("NFC", name))
+    if force := _G_FORCE.fullmatch(name.strip()):
+        return HeadingMeaning("a", force.group(1).lower(), "g")
     name = _BRACKETED_AXIS.sub(r" \1 ", name.strip().strip('"')).strip()
     if (whole := _WHOLE.get(name.lower())) is not None:
         return HeadingMeaning(whole, "", None)
-    for bare, said in _name_unit_splits(name, unit):
+    for bare, said in name_unit_splits(name, unit):
         found = _meaning_of_words([w.lower() for w in _WORD.findall(bare)], said)
         if found is None or (said is not None and said not in UNITS[found.kind]):
             continue
@@ -164,7 +129,7 @@ def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
             found = _as_angle_rate(found)
             return found._replace(
                 kind=found.kind or _kind_of(said),
-                weak=found.weak or bool({*_WITHOUT_GRAVITY} & {*found.label}),
+                weak=found.weak or bool({*WITHOUT_GRAVITY} & {*found.label}),
             )
     return _unnamed_thermometer(name, unit)
 
@@ -197,67 +162,31 @@ def _kind_of(unit: str | None) -> str:
     return next(kind for kind in "ag" if unit in UNITS[kind])
 
 
-def _name_unit_splits(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
-    """Possible splits of a text into a name and its unit."""
-    if (one := _INDEX_IN_UNIT.fullmatch(name)) is not None:
-        yield f"{one.group(1)}_{'xyz'[int(one.group(2))]}", parse_unit(one.group(3))
-        return
-    if indexed := _INDEX.fullmatch(name):
-        name = f"{indexed.group(1)}_{'xyz'[int(indexed.group(2))]}"
-    elif bracketed := _BRACKETS.fullmatch(name):
-        yield bracketed.group(1), parse_unit(bracketed.group(2))
-        return
-    cuts = [cut.span() for cut in re.finditer("[_ .]", name)]
-    for a, b in cuts:
-        axis = re.fullmatch(r"(.*)[_ .]([xyzXYZ])", name[b:])
-        inner = axis.group(1) if axis else name[b:]
-        bare = f"{name[:a]}_{axis.group(2)}" if axis else name[:a]
-        if (said := parse_unit(inner.replace("_", "/"))) is not None:
-            yield bare, said
-    for cut in _CAPITAL.finditer(name):
-        # of "GyroXRadPerSec" the end; a letter alone is an axis
-        if (said := parse_unit(_PER.sub("/", name[cut.start() :]))) in TELLING:
-            yield name[: cut.start()], said
-    yield name, parse_unit(unit)
-
-
 def _meaning_of_words(words: list[str], unit: str | None) -> HeadingMeaning | None:
     if not words:
         return None
     words = with_axis_letter(words, unit in UNITS["g"])
-    if "t" in words and unit in TEMPERATURES:
-        return HeadingMeaning(
-            "temperature", "", unit, tuple(w for w in words if w != "t")
-        )
+    if unit in TEMPERATURES and {*words} & {"t", *THERMOMETER_NAMES}:
+        label = tuple(w for w in words if w not in ("t", *THERMOMETER_NAMES))
+        return HeadingMeaning("temperature", "", unit, label)
+    if words == ["x"] and unit in UNITS["t"]:
+        # what is drawn to the right
+        return HeadingMeaning("t", "", unit)
     if (step := _step_meaning(words, unit)) is not None:
         return step
-    for phrase, kind in (*_PHRASES, *_GAINS):
+    for phrase, kind in (*PHRASES, *GAINS):
         if (at := _find_phrase(words, phrase)) is not None:
             rest = words[:at] + words[at + len(phrase) :]
+            gain = (phrase, kind) in GAINS
             # of gains as well, what was measured itself goes before them
-            weak = kind == "linear" or (phrase, kind) in _GAINS
-            return _with_axis("a" if kind == "linear" else kind, rest, unit, weak)
-    for i, word in enumerate(words):
-        rest = words[:i] + words[i + 1 :]
-        kind = next((k for k, names in _SENSORS.items() if word[:-1] in names), "")
-        # of "GyX" the axis is the X
-        apart = word in _SENSORS["g"] and bool(rest[i:]) and rest[i] in "xyz"
-        if kind and word[-1] in "xyz" and not apart:
-            return HeadingMeaning(kind, word[-1], unit, tuple(rest))
-        kind = next((k for k, names in _SENSORS.items() if word[1:] in names), "")
-        if kind and word[0] in "xyz" and len(word) > len("xg"):
-            return HeadingMeaning(kind, word[0], unit, tuple(rest))
-    for i, word in enumerate(words):
-        rest = words[:i] + words[i + 1 :]
-        kind = next((k for k, names in _SENSORS.items() if word in names), "")
-        # a letter stands before its axis: "x_g" is an axis in g
-        if kind and (len(word) > 1 or (rest[i:] and rest[i] in AXES)):
-            found = _with_axis(kind, rest, unit)
-            if found is not None:
-                return found
+            weak = kind == "linear" or gain
+            found = _with_axis("a" if kind == "linear" else kind, rest, unit, weak)
+            return found._replace(gain=gain) if found is not None else None
+    if (found := _meaning_of_sensor(words, unit)) is not None:
+        return found
     if (time := _time_meaning(words, unit)) is not None:
         return time
-    for word in _TEMPERATURES:
+    for word in THERMOMETER_NAMES:
         if word in words:
             label = tuple(w for w in words if w != word)
             return HeadingMeaning("temperature", "", unit, label)
@@ -267,13 +196,58 @@ def _meaning_of_words(words: list[str], unit: str | None) -> HeadingMeaning | No
     return _with_axis("", words, unit) if unit in TELLING else None
 
 
+def _meaning_of_sensor(words: list[str], unit: str | None) -> HeadingMeaning | None:
+    """The meaning of an axis of a sensor: words before letters, as those of ``gx3``."""
+    for letters in (False, True):
+        for find in (_joined_meaning, _parted_meaning):
+            if (found := find(words, unit, letters)) is not None:
+                return found
+    return None
+
+
+def _joined_meaning(
+    words: list[str], unit: str | None, letters: bool
+) -> HeadingMeaning | None:
+    """The meaning of a word that is a sensor and its axis: ``accx``, or ``gx``."""
+    for i, word in enumerate(words):
+        rest = words[:i] + words[i + 1 :]
+        if (len(word) == len("gx")) != letters:
+            continue
+        kind = next((k for k, names in SENSORS.items() if word[:-1] in names), "")
+        # of "GyX" the axis is the X
+        apart = word in SENSORS["g"] and bool(rest[i:]) and rest[i] in "xyz"
+        if kind and word[-1] in "xyz" and not apart:
+            return HeadingMeaning(kind, word[-1], unit, tuple(rest))
+        kind = next((k for k, names in SENSORS.items() if word[1:] in names), "")
+        if kind and word[0] in "xyz" and len(word) > len("xg"):
+            return HeadingMeaning(kind, word[0], unit, tuple(rest))
+    return None
+
+
+def _parted_meaning(
+    words: list[str], unit: str | None, letters: bool
+) -> HeadingMeaning | None:
+    """The meaning of a sensor whose axis is another word."""
+    for i, word in enumerate(words):
+        rest = words[:i] + words[i + 1 :]
+        if (len(word) == 1) != letters:
+            continue
+        kind = next((k for k, names in SENSORS.items() if word in names), "")
+        # a letter stands before its axis: "x_g" is an axis in g
+        if kind and (not letters or (rest[i:] and rest[i] in AXES)):
+            found = _with_axis(kind, rest, unit)
+            if found is not None:
+                return found
+    return None
+
+
 def bare_axis(words: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
     """An axis without a sensor, and its statistic: ``x_mean``, ``y``, ``std_z``.
 
     None where any other word is there.
     """
     label = tuple(w for w in words if w in (*MEAN, *SCATTER, *REFERENCE))
-    rest = [w for w in words if w not in (*label, "axis")]
+    rest = [w for w in words if w not in (*label, *AXIS)]
     return (rest[0], label) if rest in (["x"], ["y"], ["z"]) else None
 
 
@@ -304,20 +278,22 @@ def _with_axis(
     kind: str, rest: list[str], unit: str | None, weak: bool = False
 ) -> HeadingMeaning | None:
     """Meaning with the last axis among the other words; None if there is none."""
-    letters = [i for i, word in enumerate(rest) if word in "xyz" and len(word) == 1]
+    letters = [i for i, word in enumerate(rest) if word in AXES]
     if not letters:
         return None
-    at = letters[-1]
+    # of "acc_x_x1" the x with a number says which sensor it is
+    plain = [i for i in letters if not "".join(rest[i + 1 : i + 2]).isdecimal()]
+    at = (plain or letters)[-1]
     return HeadingMeaning(kind, rest[at], unit, tuple(rest[:at] + rest[at + 1 :]), weak)
 
 
 def _step_meaning(words: list[str], unit: str | None) -> HeadingMeaning | None:
     """The meaning of the time since the row before."""
-    for names in (*_STEPS, *_BARE_STEPS):
+    for names in (*STEPS, *BARE_STEPS):
         if (at := _find_phrase(words, names)) is not None:
             rest = words[:at] + words[at + len(names) :]
             inner = [u for w in rest if (u := parse_unit(w)) in UNITS["dt"]]
-            timed = names in _STEPS or bool(inner) or unit in UNITS["dt"]
+            timed = names in STEPS or bool(inner) or unit in UNITS["dt"]
             if len(inner) == len(rest) and timed:
                 return HeadingMeaning("dt", "", unit or (inner[-1] if inner else None))
     return None
@@ -326,15 +302,15 @@ def _step_meaning(words: list[str], unit: str | None) -> HeadingMeaning | None:
 def _time_meaning(words: list[str], unit: str | None) -> HeadingMeaning | None:
     """The meaning of a time: by its name, or by a unit of time that is all of it."""
     said = unit if unit in UNITS["t"] else None
-    named = [w for w in words if w in _TIMES]
-    rest = [w for w in words if w not in _TIMES]
+    named = [w for w in words if w in TIMES]
+    rest = [w for w in words if w not in TIMES]
     inner = [w for w in rest if parse_unit(w) in UNITS["t"]]
     if named or (len(inner) == len(rest) == 1 and len(rest[0]) > 1):
         said = said or (parse_unit(inner[-1]) if inner else None)
         label = tuple(w for w in rest if w not in inner)
         return HeadingMeaning("t", "", said if unit is None or said else unit, label)
     since = said or (parse_unit(inner[-1]) if inner else None)
-    if since and set(rest) - set(inner) and set(rest) <= {*inner, *_SINCE}:
+    if since and set(rest) - set(inner) and set(rest) <= {*inner, *SINCE}:
         return HeadingMeaning("t", "", since, tuple(w for w in rest if w not in inner))
     return None
 

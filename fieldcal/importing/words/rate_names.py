@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fieldcal.importing.words.sensor_words import AXES
+
 RATES = ("rate", "gyro", "gyr", "gyroscope", "omega")
 """Words of rates."""
 
@@ -31,6 +33,9 @@ def with_axis_letter(words: Sequence[str], as_rate: bool = False) -> list[str]:
     ['z', 'rate']
     """
     parted = [part for word in words for part in _split_name(word)]
+    if any(word[-1:] in AXES and word[:-1] in ("", *RATES) for word in parted):
+        # an r beside an axis is what is to the right
+        return [*words]
     if as_rate and {*parted} & {*ANGLES} and "rate" not in parted:
         parted.append("rate")
     axes = LETTERS | (ANGLES if "rate" in parted else {})

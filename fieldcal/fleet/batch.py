@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from fieldcal.core.errors import InputError, disk_says
 from fieldcal.core.file_names import storable_text
-from fieldcal.fleet.outcome import SessionTask
+from fieldcal.fleet.outcome import SessionTask, failed_session
 from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
@@ -59,7 +59,7 @@ class SessionBatch:
     ) -> Generator[StoredSession, None, None]:
         """Process folders; each result is in the store before it is yielded."""
         for made in run_tasks(folders, self.task, pool):
-            yield self._store(made.value or StoredSession(made.item, error=made.error))
+            yield self._store(made.value or failed_session(made.item, made.error or ""))
 
     def _store(self, one: StoredSession) -> StoredSession:
         """Store a result, or why it cannot be stored; returns what is stored.
@@ -75,7 +75,7 @@ class SessionBatch:
         except Exception as error:  # one session costs no other, whatever it is
             said = f"{one.folder}: its result cannot be stored ({error}); see"
             said += " fieldcal verify, or report this with the session"
-            refused = StoredSession(one.folder, error=said)
+            refused = failed_session(one.folder, said)
             self.database.run(
                 lambda db: sessions.store_session(db, refused), write=True
             )

@@ -97,9 +97,14 @@ class SessionsApi:
         return JSONResponse(self.job_document(job)) if job else _not_found()
 
     async def delete_job(self, request: Request) -> Response:
-        """Delete a job."""
+        """Delete a job, with its files and its result in the store."""
         number = request.path_params["id"]
-        found = await run_in_threadpool(self.jobs.remove, number)
+        try:
+            found = await run_in_threadpool(self.queue.delete, number)
+        except FieldcalError:
+            return _error_response(
+                503, "its result cannot be taken out of the store now: try again later"
+            )
         return Response(status_code=204) if found else _not_found()
 
     async def get_document(self, request: Request) -> Response:

@@ -169,6 +169,7 @@ def test_what_is_sent_is_done_and_can_be_had_and_taken_away(served: Served) -> N
     assert client.ask(here).status == client.ask(f"{here}/report.html").status == 404
     assert client.ask(here, method="DELETE").status == 404
     assert list(served.jobs.root.iterdir()) == []
+    assert Database(served.jobs.root.parent / "h").run(sessions.find_sessions) == []
 
 
 def test_what_is_bad_says_why_and_not_where(served: Served) -> None:

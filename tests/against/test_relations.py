@@ -1,8 +1,12 @@
 """Evidence of one effect in two sessions, against dense Gaussian densities."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from fieldcal.against.causes import aliases_of
 from fieldcal.against.joint import (
     EffectInformation,
     evidence_of_proportional,
@@ -52,6 +56,23 @@ def over_sizes(values: list[float]) -> float:
 
 
 REAL, SIM = rows(np.array([0.02, -0.01]), 1), rows(np.array([0.015, 0.0]), 2)
+
+
+def test_the_aliases_of_an_effect_are_those_of_all_recordings_that_have_it() -> None:
+    """An effect is no alias of itself, and a tilt of the simulator is named."""
+
+    def diagnosed(**alternatives: tuple[str, ...]) -> Any:
+        known = {n: dict.fromkeys(a) for n, a in alternatives.items()}
+        posterior = SimpleNamespace(alternatives=known)
+        return SimpleNamespace(explanation=SimpleNamespace(posterior=posterior))
+
+    real = diagnosed(scale_asymmetry=("quadratic", "cross_coupling"))
+    sim = diagnosed(cross_coupling=("base_tilt", "position"))
+    instead = {"cross_coupling": "scale_asymmetry"}
+    both = aliases_of("cross_coupling", [real, sim], instead)
+    assert both == ("scale_asymmetry", "quadratic", "base_tilt")
+    assert aliases_of("cross_coupling", [sim], instead) == ("base_tilt",)
+    assert aliases_of("hum", [real, sim], {}) == ()
 
 
 def test_the_same_effect_in_both_is_that_of_all_rows_together() -> None:

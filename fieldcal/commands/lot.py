@@ -144,7 +144,7 @@ def _print_lot(found: LotAnalysis) -> None:
 def lot_findings(found: LotAnalysis) -> list[str]:
     """Lines about odd units, shifts, and charts beyond their limits."""
     from fieldcal.calibration.wording import format_unit, format_with_sigma
-    from fieldcal.fleet.lot import untimed_sentence
+    from fieldcal.fleet.lot import serials_sentence, untimed_sentence
 
     out = []
     for odd in found.odd[:ODD_UNITS_SHOWN]:
@@ -174,6 +174,8 @@ def lot_findings(found: LotAnalysis) -> list[str]:
             f" {escape_line(alarm.at)}; its mean changes at about"
             f" {escape_line(alarm.since)}"
         )
+    if alike := serials_sentence(found):
+        out.append(escape_line(alike))
     if found.untimed:
         out.append(untimed_sentence(found))
     if found.in_control:

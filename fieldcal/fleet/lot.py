@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from fieldcal.fleet.levels import Grouping, groupings
 from fieldcal.fleet.lot_yield import yield_interval
 from fieldcal.fleet.odd import benjamini_hochberg, unit_p_values
 from fieldcal.fleet.shifts import Shift, find_shifts
+from fieldcal.fleet.units import is_unit, latest_session_per_unit, serials_alike
 from fieldcal.history.sessions import LEVELS, StoredSession, parameter_values
 
 MIN_UNITS = 5
@@ -161,7 +161,7 @@ def analyse_lot(
         If fewer than `MIN_UNITS` units have a result.
 
     """
-    units = [one for one in latest_session_per_unit(sessions) if _is_unit(one)]
+    units = [one for one in latest_session_per_unit(sessions) if is_unit(one)]
     useful = [one for one in units if one.good]
     if len(useful) < MIN_UNITS:
         raise InputError(
@@ -208,35 +208,22 @@ def analyse_lot(
     )
 
 
-def unit_name(one: StoredSession) -> str:
-    """Serial number of a unit, or the name of its folder if it has none."""
-    return one.serial or Path(one.folder).name
+def serials_sentence(found: LotAnalysis) -> str:
+    """Sentence about serial numbers that may be of one unit; empty without any."""
+    alike = serials_alike(found.units)
+    if not alike:
+        return ""
+    named = "; ".join(" and ".join(some) for some in alike)
+    return (
+        f"serial numbers that differ by upper and lower case only: {named}. Each counts"
+        " as a unit; if they are one, correct session.toml and run fieldcal batch again"
+    )
 
 
 def untimed_sentence(found: LotAnalysis) -> str:
     """Sentence about units whose time is unknown."""
     which = "1 unit" if found.untimed == 1 else f"{found.untimed} units"
     return f"{which} of unknown time: not in the control charts"
-
-
-def latest_session_per_unit(sessions: Sequence[StoredSession]) -> list[StoredSession]:
-    """Return each unit's last session with a good result, or else its last session."""
-    units: dict[str, StoredSession] = {}
-    for one in sorted(sessions, key=_time_order):
-        key = one.serial or one.folder
-        before = units.pop(key, None)
-        kept = before is not None and before.good and not one.good
-        units[key] = before if before is not None and kept else one
-    return sorted(units.values(), key=_time_order)
-
-
-def _is_unit(one: StoredSession) -> bool:
-    """Whether a session is of a unit: nobody knows of what a broken folder is."""
-    return one.good is not None or bool(one.serial)
-
-
-def _time_order(one: StoredSession) -> tuple[str, str]:
-    return (one.taken_at or "", one.folder)
 
 
 def _stated_levels(useful: Sequence[StoredSession]) -> list[dict[str, str]]:

@@ -9,10 +9,11 @@ from fieldcal.fleet.capability import LotParameter
 from fieldcal.fleet.control import ControlChart
 from fieldcal.fleet.lot import (
     LotAnalysis,
-    unit_name,
+    serials_sentence,
     untimed_sentence,
 )
 from fieldcal.fleet.lot_yield import yield_sentence
+from fieldcal.fleet.units import unit_name
 from fieldcal.report.blocks import (
     Cell,
     Collapsible,
@@ -23,6 +24,7 @@ from fieldcal.report.blocks import (
     Section,
     Table,
     Tone,
+    WarningBox,
     table,
 )
 from fieldcal.report.charts import Axis, Chart, ChartMark, Series
@@ -112,8 +114,10 @@ def _verdict(found: LotAnalysis) -> str:
 
 
 def _odd(found: LotAnalysis) -> list[ReportBlock]:
+    alike = serials_sentence(found)
+    notes: list[ReportBlock] = [WarningBox(alike)] if alike else []
     if not found.odd:
-        return [Paragraph("No unit is out of family.")]
+        return [*notes, Paragraph("No unit is out of family.")]
     rows = []
     for one in found.odd:
         off = " ± ".join(format_with_sigma(one.deviation, one.sigma))
@@ -126,6 +130,7 @@ def _odd(found: LotAnalysis) -> list[ReportBlock]:
         )  # fmt: skip
     columns = ("unit", "parameter", ">off by", "", ">chance", "session")
     return [
+        *notes,
         table("Out of family, by the oddest parameter", columns, rows),
         Paragraph(ODD),
     ]

@@ -365,6 +365,17 @@ def test_the_page_says_of_each_finding_which_unit_and_what_to_do() -> None:
     assert "1 drift" in text and "charts in control" in text
 
 
+def test_serial_numbers_alike_but_for_case_are_told() -> None:
+    some = units(8)
+    some[3] = replace(some[3], serial="sn-1")
+    some[5] = replace(some[5], serial="SN-1")
+    found = of(some)
+    assert len(found.units) == 8
+    (said,) = (line for line in lot_findings(found) if "upper and lower case" in line)
+    assert "SN-1 and sn-1" in said and "SN-1 and sn-1" in render_lot_page(found, "7")
+    assert not any("lower case" in line for line in lot_findings(of(units(8))))
+
+
 def test_a_spread_within_the_errors_has_a_bound_of_cpk() -> None:
     rng = np.random.default_rng(31)
     x = 0.01 * rng.standard_normal(12)

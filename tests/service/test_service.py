@@ -178,6 +178,12 @@ def test_what_is_bad_says_why_and_not_where(served: Served) -> None:
     assert job["state"] == "failed" and job["error"] == "is bad; send another"
 
 
+def test_an_unknown_option_is_named(served: Served) -> None:
+    answer = served.client.send("x", b"1", "&serail=A1")
+    assert answer.status == 400
+    assert answer.json["error"].startswith("serail: there is no option of this name")
+
+
 def test_nobody_is_let_in_without_a_token(served: Served) -> None:
     host = served.service.access.hosts[0]
     for token in ("", "wrong", TOKEN + "x"):

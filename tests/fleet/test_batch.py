@@ -102,6 +102,22 @@ def test_a_tree_is_solved_and_what_is_broken_has_a_row(
     )
 
 
+@pytest.mark.usefixtures("inside")
+def test_a_log_file_says_how_far_a_batch_is(
+    tree: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(command, "NOTE_INTERVAL", 0.0)
+    monkeypatch.setattr("fieldcal.fleet.outcome.SessionTask", Quick)
+    call = ["batch", str(tree), "--history", str(tmp_path / "h")]
+    main([*call, "-o", str(tmp_path / "t.parquet")])
+    said = capsys.readouterr().err
+    assert "1 of 3 sessions done, about 0 min left" in said
+    assert "3 of 3 sessions done" in said
+
+
 def test_a_row_has_the_folder_that_was_asked_for(tree: Path, tmp_path: Path) -> None:
     """Where a worker reaches it by another path, its row would not be found again."""
     link = tmp_path / "link"

@@ -15,6 +15,7 @@ from fieldcal.fleet.outcome import SessionTask, failed_session
 from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
+from fieldcal.history.repeats import replacing_folders
 from fieldcal.history.sessions import LEVELS, StoredSession
 
 CHUNK = 500
@@ -38,12 +39,23 @@ class SessionBatch:
     database: Database
 
     def unprocessed(self) -> list[str]:
-        """Sessions whose row in the store is missing or of other files or options."""
+        """Sessions whose row in the store is missing or of other files or options.
+
+        So are those whose row was replaced by a copy that is gone: a copy in another
+        folder, stored later, counts instead of them.
+        """
         known = self.database.run(sessions.fingerprints)
+        replacing = self.database.run(replacing_folders)
+        gone = {
+            folder
+            for folder, instead in replacing.items()
+            if not any(Path(one).is_dir() for one in instead)
+        }
         return [
             str(folder)
             for folder in self.folders
-            if (mark := known.get(storable_text(str(folder)))) is None
+            if (mark := known.get(name := storable_text(str(folder)))) is None
+            or name in gone
             or mark != self._fingerprint(folder)
         ]
 

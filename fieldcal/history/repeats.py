@@ -37,6 +37,22 @@ def supersede(db: Connection, number: int, serial: str, part: RecordedPart) -> N
     db.execute(there.values(accepted=False, superseded=True))
 
 
+def replacing_folders(db: Connection) -> dict[str, list[str]]:
+    """Folders of the rows that count, by the folder of the row that they replace."""
+    own, other = SESSION.alias(), SESSION.alias()
+    query = select(own.c.folder, other.c.folder).where(
+        own.c.superseded,
+        ~other.c.superseded,
+        other.c.recording == own.c.recording,
+        other.c.part_start < own.c.part_end,
+        other.c.part_end > own.c.part_start,
+    )
+    found: dict[str, list[str]] = {}
+    for folder, instead in db.execute(query):
+        found.setdefault(folder, []).append(instead)
+    return found
+
+
 def withdraw(db: Connection, folders: Sequence[str]) -> None:
     """Delete the rows of folders; what one of them superseded counts again.
 

@@ -181,6 +181,34 @@ def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
     assert batch.unprocessed() == [str(found[0])]
 
 
+def test_a_session_counts_again_if_the_copy_that_replaced_it_is_gone(
+    tree: Path, tmp_path: Path
+) -> None:
+    first, second = tmp_path / "t" / "a", tmp_path / "t" / "b"
+    shutil.copytree(tree / "station 1" / "session", first)
+    data = Database(tmp_path / "h")
+
+    def left() -> list[str]:
+        every = SessionBatch(sessions_in([tmp_path / "t"]), SessionTask(), data)
+        return [Path(folder).name for folder in every.unprocessed()]
+
+    def done(folder: Path) -> None:
+        one = SessionTask()(str(folder))
+        data.run(lambda db: sessions.store_session(db, one), write=True)
+
+    done(first)
+    shutil.copytree(first, second)
+    assert left() == ["b"]
+    done(second)
+    assert left() == []
+    shutil.rmtree(second)
+    assert left() == ["a"]
+    done(first)
+    assert left() == []
+    (one,) = data.run(lambda db: sessions.find_sessions(db, once=True))
+    assert one.folder == str(first)
+
+
 @pytest.mark.parametrize("given", [True, False])
 def test_other_limits_are_another_judgement(
     tree: Path, tmp_path: Path, given: bool

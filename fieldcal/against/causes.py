@@ -53,6 +53,11 @@ class DecidedCauses:
     real: WidenedSet
     sim: WidenedSet
 
+    def both_show(self, key: str) -> bool:
+        """Whether both recordings could show a cause of typical size."""
+        told = [one.effect_information(key) for one in self.pairing.widened]
+        return all(one is not None and one.shows for one in told)
+
 
 def decide_causes(pairing: CausePairing) -> DecidedCauses:
     """Decide for each cause whether recording and simulator have it."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fieldcal.against.causes import aliases_of
+from fieldcal.against.causes import DecidedCauses, aliases_of
 from fieldcal.against.joint import (
     EffectInformation,
     evidence_of_proportional,
@@ -73,6 +73,25 @@ def test_the_aliases_of_an_effect_are_those_of_all_recordings_that_have_it() -> 
     assert both == ("scale_asymmetry", "quadratic", "base_tilt")
     assert aliases_of("cross_coupling", [sim], instead) == ("base_tilt",)
     assert aliases_of("hum", [real, sim], {}) == ()
+
+
+def test_only_what_both_could_show_is_compared() -> None:
+    def side(**told: EffectInformation) -> Any:
+        return SimpleNamespace(effect_information=told.get)
+
+    inner = np.zeros((2, 2))
+    blind = EffectInformation(inner, np.zeros(2), 0.0)
+    real, sim = (
+        side(tilt=told(*REAL), g=told(*REAL), hum=told(*REAL)),
+        side(tilt=told(*SIM), g=blind),
+    )
+    pairing: Any = SimpleNamespace(widened=(real, sim))
+    found = DecidedCauses(pairing, {}, real, sim)
+    assert [found.both_show(key) for key in ("tilt", "g", "hum")] == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_the_same_effect_in_both_is_that_of_all_rows_together() -> None:

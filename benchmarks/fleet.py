@@ -47,6 +47,9 @@ SECONDS, GAP = 30.0, 10.0
 TRIALS = 40
 """Drawn lots, and drawn sets of sessions."""
 
+LOTS = 100
+"""Drawn lots in control."""
+
 
 def recorded(
     folder: Path,
@@ -212,6 +215,10 @@ def lots() -> None:
     for size in (0.0, 0.5, 1.0):
         for count, late in ((100, 50), (400, 200), (450, 50)):
             shifted(rng, bounds, size, count, late)
+    for count in (60, 150, 400):
+        some_lots = (analyse_lot(units(rng, count), bounds) for _ in range(LOTS))
+        alarms = sum(bool(one.alarms) for one in some_lots)
+        print(f"a chart has an alarm in {alarms} of {LOTS} lots of {count} in control")
     some = units(rng, 10_000)
     begun = perf_counter()
     analyse_lot(some, bounds)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +52,11 @@ class DecidedCauses:
     relations: dict[str, tuple[Relation, float]]
     real: WidenedSet
     sim: WidenedSet
+
+    def both_show(self, key: str) -> bool:
+        """Whether both recordings could show a cause of typical size."""
+        told = [one.effect_information(key) for one in self.pairing.widened]
+        return all(one is not None and one.shows for one in told)
 
 
 def decide_causes(pairing: CausePairing) -> DecidedCauses:
@@ -149,7 +154,7 @@ def _difference(
         direction=direction,
         probability=max(found.relations[k][1] for k in keys),
         parameters=parameters,
-        aliases=_aliases(source, pairing.instead.get(name, name)),
+        aliases=aliases_of(name, _having(pairing, direction), pairing.instead),
         where=_mismatches_of_cause(source, pairing.instead.get(name, name)),
         shown=any(t is not None and t.shows for t in told),
         explained=name in catalogue(),
@@ -241,10 +246,28 @@ def _size_of(there: WidenedSet, member: Member) -> float:
     return float(priors.SIZES[there.set.sizes.members[at]])
 
 
-def _aliases(source: DiagnosedRecording, name: str) -> tuple[str, ...]:
-    """Aliases of an effect in its own session."""
-    stands = source.explanation.posterior.alternatives.get(name, {})
-    return tuple(n for n in stands if n in catalogue())
+def _having(pairing: CausePairing, direction: Direction) -> list[DiagnosedRecording]:
+    """The recordings that have an effect."""
+    some = {"left_out": [pairing.real], "added": [pairing.sim]}
+    return some.get(direction, [pairing.real, pairing.sim])
+
+
+def aliases_of(
+    name: str, having: Sequence[DiagnosedRecording], instead: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Effects that explain as well what an effect explains, in any recording with it.
+
+    `instead` has the name by which a recording knew the effect before it got that of
+    the other recording; it is an alias itself.
+    """
+    out: dict[str, None] = {}
+    for one in having:
+        alternatives = one.explanation.posterior.alternatives
+        own = instead.get(name, name)
+        own = own if own in alternatives else name
+        if own in alternatives:
+            out |= dict.fromkeys([own, *alternatives[own]])
+    return tuple(n for n in out if n != name and n in catalogue())
 
 
 def _mismatches_of_cause(source: DiagnosedRecording, name: str) -> tuple[Mismatch, ...]:

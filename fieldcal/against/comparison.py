@@ -82,10 +82,18 @@ def compare_sides(real: DiagnosedRecording, sim: DiagnosedRecording) -> Match:
 def _probability(
     found: causes.DecidedCauses, differences: Sequence[Difference]
 ) -> float:
-    """Probability that all reported differences exist, or that none does."""
+    """Probability that all reported differences exist, or that none does.
+
+    What one of the two cannot show is not compared.
+    """
     if differences:
         return float(np.prod([d.probability for d in differences]))
-    return float(np.prod([1 - differ for _, differ in found.relations.values()]))
+    alike = [
+        1 - differ
+        for key, (_, differ) in found.relations.items()
+        if found.both_show(key)
+    ]
+    return float(np.prod(alike))
 
 
 def _warnings_of(one: DiagnosedRecording) -> list[str]:

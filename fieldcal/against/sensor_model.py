@@ -92,6 +92,16 @@ class SensorModel:
                 out[row, column] += float(value)
         return out
 
+    def assumed(self, ids: Sequence[str]) -> list[str]:
+        """Ids, of calibration or effects, that neither patch nor simulator shows.
+
+        Where an element of a file holds them, it has the value of a perfect sensor.
+        """
+        known = {*self.calibration, *self.effects}
+        if self.shown is not None:
+            known |= {*self.shown.calibration, *self.shown.effects}
+        return [one for one in ids if one not in known]
+
     def number(self, effect: str, name: str) -> float:
         """A parameter of an effect; 0 where it is absent."""
         return float(self.parameters(effect).get(name, 0.0))

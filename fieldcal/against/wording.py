@@ -92,6 +92,12 @@ def difference_with_parameters(one: Difference) -> str:
 
 def possible_difference(one: Difference) -> str:
     """Sentence about a difference that is not probable enough to be reported."""
+    if not one.shown:
+        who = "recording" if one.direction == "added" else "simulator"
+        return (
+            f"{difference_with_parameters(one)} is not compared: nothing in the output"
+            f" of the {who} would show it"
+        )
     return (
         f"{difference_with_parameters(one)} may differ, with a probability of"
         f" {one.probability:.2f}; from"

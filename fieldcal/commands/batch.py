@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from fieldcal.core.errors import InputError
@@ -27,6 +28,9 @@ EXAMPLE = """\
   fieldcal batch archive --jobs 8 -o march.parquet
   fieldcal batch /net/archive --scheduler tcp://10.0.0.5:8786
 """
+
+NOTE_INTERVAL = 60.0
+"""Time between lines about the progress where no bar can be drawn, s."""
 
 DEFAULT_TABLE = "batch.parquet"
 
@@ -112,7 +116,10 @@ def worker_pool(args: argparse.Namespace) -> Iterator[WorkerPool]:
 def process_with_progress(
     batch: SessionBatch, left: list[str], pool: WorkerPool
 ) -> None:
-    """Process the folders `left`, with a bar that shows rate and remaining time."""
+    """Process the folders `left`, with a bar that shows rate and remaining time.
+
+    In a log file, where a bar cannot be drawn, a line tells them now and then.
+    """
     from rich import progress
 
     from fieldcal.commands.console import EscapingConsole
@@ -127,13 +134,21 @@ def process_with_progress(
     )
     with bar, contextlib.closing(batch.process(left, pool)) as done:
         task = bar.add_task("", total=len(left), rate="")
-        for one in done:
+        begun = noted = monotonic()
+        for number, one in enumerate(done, 1):
             bar.update(task, advance=1)
             speed = bar.tasks[0].speed
             if speed:
                 bar.update(task, rate=f"{60 * speed:.3g} a minute")
             if one.error:
                 bar.console.print(escape_line(one.error), soft_wrap=True)
+            now = monotonic()
+            if not bar.console.is_terminal and now - noted >= NOTE_INTERVAL:
+                noted, each = now, (now - begun) / number / 60
+                bar.console.print(
+                    f"{number} of {len(left)} sessions done,"
+                    f" about {each * (len(left) - number):.0f} min left"
+                )
 
 
 def _print_summary(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:

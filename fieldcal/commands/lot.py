@@ -12,9 +12,15 @@ from fieldcal.core.escaping import escape_line
 from fieldcal.core.grade import GRADES
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from fieldcal.fleet.lot import LotAnalysis
+    from fieldcal.history.database import Database
 
 RARE = ("limits", "history")
+
+NAMES_SHOWN = 12
+"""Number of names in the store that are listed if a condition finds none."""
 
 ODD_UNITS_SHOWN = 12
 """Number of odd units that are listed; --json has all."""
@@ -67,6 +73,8 @@ def run(args: argparse.Namespace) -> int:
     some = database.run(lambda db: sessions.find_sessions(db, wanted, once=True))
     if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
         sys.stderr.write(f"fieldcal lot: {lost}\n")
+    if not some:
+        raise InputError(_why_none(database, wanted))
     found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)
     if args.report:
         from fieldcal.report.lot_page import render_lot_page
@@ -84,17 +92,41 @@ def run(args: argparse.Namespace) -> int:
     return 0 if found.in_control else 1
 
 
+def _why_none(database: Database, wanted: Mapping[str, str]) -> str:
+    """Why no session of the store meets all conditions, and what there is."""
+    from fieldcal.history import sessions
+
+    since, until = wanted.get("since"), wanted.get("until")
+    if since and until and since > until and not since.startswith(until):
+        return f"since={since} is later than until={until}: exchange the two"
+    for name, value in wanted.items():
+        if name in sessions.TIMES:
+            continue
+        known = database.run(lambda db, n=name: sessions.names_in_store(db, n))  # type: ignore[misc]
+        if value not in known:
+            shown = ", ".join(map(escape_line, known[:NAMES_SHOWN])) or "none yet"
+            more = f" and {n} more" if (n := len(known) - NAMES_SHOWN) > 0 else ""
+            return (
+                f"{name}={value}: {database.location_text} has no session of it; of"
+                f" {name} it has {shown}{more}"
+            )
+    asked = " ".join(f"{name}={value}" for name, value in wanted.items())
+    return (
+        f"{database.location_text}: no session meets {asked or 'any condition'}; ask"
+        " for fewer conditions, or run fieldcal batch on more sessions"
+    )
+
+
 def _print_lot(found: LotAnalysis) -> None:
     from fieldcal.calibration.wording import format_unit, format_with_sigma
     from fieldcal.commands.text_columns import text_columns
+    from fieldcal.fleet.lot_yield import yield_sentence
 
     say = sys.stdout.write
-    share, low, high = (100 * part for part in found.yield_share)
     say(
-        f"{len(found.units)} units with a good result, of {found.sessions} sessions;"
-        f" {found.failed} without a result\n"
-        f"yield {found.good} of {found.judged}: {share:.1f} % (95 %: {low:.1f} to"
-        f" {high:.1f} %)\n\n"
+        f"{len(found.units)} units with a good result; {found.sessions} sessions,"
+        f" {found.failed} of them without a result\n"
+        f"yield {yield_sentence(found)}\n\n"
     )
     rows = [["parameter", "mean ± of it", "spread (95 %)", "Cpk"]]
     for one in found.parameters.values():
@@ -102,8 +134,7 @@ def _print_lot(found: LotAnalysis) -> None:
         mean = " ± ".join(format_with_sigma(fit.mean, fit.mean_sigma))
         wide = f"{fit.spread:.2g} ({fit.low:.2g} to {fit.high:.2g})"
         unit = format_unit(one.unit)
-        cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
-        rows.append([one.name, mean, f"{wide} {unit}".rstrip(), cpk])
+        rows.append([one.name, mean, f"{wide} {unit}".rstrip(), one.cpk_text])
     for line in text_columns(rows):
         say(line + "\n")
     for line in lot_findings(found):
@@ -113,7 +144,7 @@ def _print_lot(found: LotAnalysis) -> None:
 def lot_findings(found: LotAnalysis) -> list[str]:
     """Lines about odd units, shifts, and charts beyond their limits."""
     from fieldcal.calibration.wording import format_unit, format_with_sigma
-    from fieldcal.fleet.lot import untimed_sentence
+    from fieldcal.fleet.lot import serials_sentence, untimed_sentence
 
     out = []
     for odd in found.odd[:ODD_UNITS_SHOWN]:
@@ -138,13 +169,13 @@ def lot_findings(found: LotAnalysis) -> list[str]:
             f" {told}"
         )
     for alarm in found.alarms:
-        since = (
-            "" if alarm.since is None else f", since about {escape_line(alarm.since)}"
-        )
         out.append(
             f"drift: {alarm.parameter} leaves the {alarm.chart} chart at"
-            f" {escape_line(alarm.at)}{since}"
+            f" {escape_line(alarm.at)}; its mean changes at about"
+            f" {escape_line(alarm.since)}"
         )
+    if alike := serials_sentence(found):
+        out.append(escape_line(alike))
     if found.untimed:
         out.append(untimed_sentence(found))
     if found.in_control:

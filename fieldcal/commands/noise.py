@@ -256,7 +256,8 @@ def _recalibration_times(
     out = {}
     for name, channel in model.channels.items():
         group = "acc_bias" if name[0] == "a" else "gyr_bias"
-        earlier = _earlier_biases(runs, f"{group}.{name[1]}")
+        usual = allowed.per_kelvin(group)
+        earlier = _earlier_biases(runs, f"{group}.{name[1]}", usual)
         limit = float(getattr(allowed, f"{group}_sigma"))
         variance = channel.averaging.at(AVERAGED_S)[0] ** 2
         pair = channel.pair
@@ -268,16 +269,23 @@ def _recalibration_times(
     return out, dates[-1] if dates else datetime.now(UTC).isoformat()
 
 
-def _earlier_biases(runs: Sequence[Any], name: str) -> list[EarlierBias]:
+def _earlier_biases(
+    runs: Sequence[Any], name: str, per_kelvin: float
+) -> list[EarlierBias]:
     """A bias by the calibrations that count as its family, one for each time."""
     from fieldcal.history.store import family_runs, recording_time
     from fieldcal.noise.history_walk import EarlierBias
 
+    some = [one for one in family_runs(runs) if name in one.calibration.names]
+    known = [one.temperature for one in some if one.temperature is not None]
+    usual = sum(known) / len(known) if known else 0.0
     found: dict[float, EarlierBias] = {}
-    for one in family_runs(runs):
-        known = one.calibration
+    for one in some:
         when = recording_time(one.taken_at)
-        if name in known.names and when is not None:
-            at = when.timestamp()
-            found[at] = EarlierBias(at, known.value(name), known.uncertainty(name) ** 2)
+        if when is None:
+            continue
+        value, sigma = one.calibration.value(name), one.calibration.uncertainty(name)
+        apart = 0.0 if one.temperature is None else one.temperature - usual
+        at = when.timestamp()
+        found[at] = EarlierBias(at, value, sigma**2, per_kelvin * apart)
     return [found[at] for at in sorted(found)]

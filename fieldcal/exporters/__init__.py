@@ -72,6 +72,23 @@ class ExportSource:
             )
         return says
 
+    @property
+    def zero_couplings(self) -> list[str]:
+        """Kinds of cross-coupling that were not determined: 0 in the matrices."""
+        kinds = ("cross_coupling", "gyro_cross_coupling")
+        return [kind for kind in kinds if not self.calibration.components(kind)]
+
+    @property
+    def matrix_notices(self) -> list[str]:
+        """Notices for the user that hold for any format with matrices."""
+        triads = {"cross_coupling": "accelerometers"}
+        return self.notices + [
+            f"the cross-coupling of the {triads.get(kind, 'gyroscopes')} was not"
+            " determined: the matrix has 0 there, which is no measured value; fieldcal"
+            " solve --cross or fieldcal diagnose tells whether the positions show it"
+            for kind in self.zero_couplings
+        ]
+
 
 class Exporter(Protocol):
     """Interface of a format module in `exporters`."""

@@ -46,7 +46,7 @@ def write(source: ExportSource, path: Path) -> list[str]:
             file, "\n\n".join(_format_array(part) for part in parts) + "\n"
         )
     return [
-        *source.notices,
+        *source.matrix_notices,
         f"the gyroscopes are in {second}",
         "true = T K (raw - B), m/s^2 and rad/s; T, K and B one after the other",
     ]

@@ -3,8 +3,8 @@
     f = matrix (U - bias),  matrix = M^-1                                          (1)
 
 with fieldcal's U = bias + M f. ``sigma`` is that of each parameter as it was estimated;
-``nominal`` names biases and scale factors that were not. Device axes, m/s^2 and
-rad/s.
+``nominal`` names biases and scale factors that were not, ``zero`` the cross-coupling
+that was not and is 0 in the matrix. Device axes, m/s^2 and rad/s.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ def document(source: ExportSource) -> dict[str, Any]:
         "parameters": parameters,
         "nominal": source.undetermined,
         "warnings": list(found.warnings),
-        "notes": source.notices,
+        "zero": source.zero_couplings,
+        "notes": source.matrix_notices,
     }
 
 
@@ -66,4 +67,4 @@ def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; returns notices for the user."""
     text = json.dumps(document(source), indent=2, allow_nan=False)
     write_atomically(path, text + "\n")
-    return source.notices
+    return source.matrix_notices

@@ -78,11 +78,12 @@ def _means(block: Block) -> Array:
 
 def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; returns notices for the user."""
-    says = list(source.notices)
+    says = list(source.matrix_notices)
     acc_bias, acc = source.linear("acc")
     gyr_bias, gyr = source.linear("gyr")
     lower, turn = split_rotation(gyr)
     lines = ["# fieldcal: raw = M true + bias (true -> raw), m/s^2 and rad/s"]
+    lines += [f"# {kind} was not determined: 0" for kind in source.zero_couplings]
     found = read_noise(source.session.folder)
     lines += (
         _densities_of_windows(source.session, says)

@@ -106,7 +106,7 @@ def write(source: ExportSource, path: Path) -> list[str]:
     finally:
         part.unlink(missing_ok=True)
     moved = [f"times begin {shift:g} s later: MCAP has none before 0"] * (shift > 0)
-    return [*source.notices, *moved]
+    return [*source.matrix_notices, *moved]
 
 
 def _header(t: float) -> dict[str, Any]:

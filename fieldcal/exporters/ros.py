@@ -49,6 +49,7 @@ def _covariance_lines(told: Mapping[str, Any]) -> list[str]:
 def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; returns notices for the user."""
     lines = ["# fieldcal: true = SM raw - bias (raw -> true), m/s^2 and rad/s"]
+    lines += [f"# {kind} was not determined: 0" for kind in source.zero_couplings]
     for sensor, prefix in (("acc", ""), ("gyr", "gyro_")):
         turned, bias = matrices(*source.linear(sensor))
         for name, values in ((f"{prefix}SM", turned.ravel()), (f"{prefix}bias", bias)):
@@ -57,4 +58,4 @@ def write(source: ExportSource, path: Path) -> list[str]:
     if found := read_noise(source.session.folder):
         lines += _covariance_lines(found["for"]["ros"])
     write_atomically(path, "\n".join(lines) + "\n")
-    return source.notices
+    return source.matrix_notices

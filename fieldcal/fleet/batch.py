@@ -11,10 +11,11 @@ import pyarrow.parquet as pq
 
 from fieldcal.core.errors import InputError, disk_says
 from fieldcal.core.file_names import storable_text
-from fieldcal.fleet.outcome import SessionTask
+from fieldcal.fleet.outcome import SessionTask, failed_session
 from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
+from fieldcal.history.repeats import replacing_folders
 from fieldcal.history.sessions import LEVELS, StoredSession
 
 CHUNK = 500
@@ -38,12 +39,23 @@ class SessionBatch:
     database: Database
 
     def unprocessed(self) -> list[str]:
-        """Sessions whose row in the store is missing or of other files or options."""
+        """Sessions whose row in the store is missing or of other files or options.
+
+        So are those whose row was replaced by a copy that is gone: a copy in another
+        folder, stored later, counts instead of them.
+        """
         known = self.database.run(sessions.fingerprints)
+        replacing = self.database.run(replacing_folders)
+        gone = {
+            folder
+            for folder, instead in replacing.items()
+            if not any(Path(one).is_dir() for one in instead)
+        }
         return [
             str(folder)
             for folder in self.folders
-            if (mark := known.get(storable_text(str(folder)))) is None
+            if (mark := known.get(name := storable_text(str(folder)))) is None
+            or name in gone
             or mark != self._fingerprint(folder)
         ]
 
@@ -59,7 +71,7 @@ class SessionBatch:
     ) -> Generator[StoredSession, None, None]:
         """Process folders; each result is in the store before it is yielded."""
         for made in run_tasks(folders, self.task, pool):
-            yield self._store(made.value or StoredSession(made.item, error=made.error))
+            yield self._store(made.value or failed_session(made.item, made.error or ""))
 
     def _store(self, one: StoredSession) -> StoredSession:
         """Store a result, or why it cannot be stored; returns what is stored.
@@ -75,7 +87,7 @@ class SessionBatch:
         except Exception as error:  # one session costs no other, whatever it is
             said = f"{one.folder}: its result cannot be stored ({error}); see"
             said += " fieldcal verify, or report this with the session"
-            refused = StoredSession(one.folder, error=said)
+            refused = failed_session(one.folder, said)
             self.database.run(
                 lambda db: sessions.store_session(db, refused), write=True
             )

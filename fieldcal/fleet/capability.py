@@ -21,6 +21,7 @@ import numpy as np
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import ParameterName
 from fieldcal.core.samples import Array, Index
+from fieldcal.fleet.chart_limits import chart_limits
 from fieldcal.fleet.control import ControlChart, cusum, ewma
 from fieldcal.fleet.spread import UnitDistribution, estimate_distribution
 
@@ -41,7 +42,10 @@ class LotParameter:
     unit_numbers : (n,) number of each unit that has the parameter
     x, sigma : (n,) value and standard uncertainty, in the order of time
     distribution : mean and spread over the units
-    cp, cp_sigma, cpk, cpk_sigma : (1), (2); None without a tolerance
+    cp, cp_sigma, cpk, cpk_sigma : (1), (2); None without a tolerance, or if the
+        estimated spread is zero
+    cpk_at_least : Cpk at the upper end of the 95 % interval of the spread; None without
+        a tolerance
     tolerance : T, largest accepted deviation from the nominal value
     untimed : number of the first units, whose time is unknown
     charts : control charts of the other units
@@ -59,8 +63,17 @@ class LotParameter:
     cp_sigma: float | None
     cpk: float | None
     cpk_sigma: float | None
+    cpk_at_least: float | None
     untimed: int
     charts: tuple[ControlChart, ...]
+
+    @property
+    def cpk_text(self) -> str:
+        """Cpk with its ±, or a lower bound if the spread is within the errors."""
+        if self.cpk is not None:
+            return f"{self.cpk:.2f} ± {self.cpk_sigma:.2f}"
+        least = self.cpk_at_least
+        return "" if least is None else f"> {least:.2g} (95 %)"
 
     def to_json(self) -> dict[str, Any]:
         """Return a JSON object; null where a value is not known."""
@@ -77,6 +90,7 @@ class LotParameter:
             "cp_sigma": self.cp_sigma,
             "cpk": self.cpk,
             "cpk_sigma": self.cpk_sigma,
+            "cpk_at_least": self.cpk_at_least,
         }
 
 
@@ -105,18 +119,23 @@ def lot_parameter(
     about = estimate_distribution(x, sigma)
     parsed = ParameterName.of(name)
     tolerance = limits.tolerance(parsed.group)
-    cp = cp_sigma = cpk = cpk_sigma = None
+    cp = cp_sigma = cpk = cpk_sigma = least = None
+    off = abs(about.mean - (1.0 if parsed.is_scale else 0.0))
+    if tolerance is not None and about.high > 0:
+        least = (tolerance - off) / (3 * about.high)
     if tolerance is not None and about.spread > 0:
-        off = abs(about.mean - (1.0 if parsed.is_scale else 0.0))
         cp = tolerance / (3 * about.spread)  # (1)
         cpk = (tolerance - off) / (3 * about.spread)
         part = about.spread_sigma / about.spread
         cp_sigma = cp * part  # (2)
         cpk_sigma = float(np.hypot(about.mean_sigma / (3 * about.spread), cpk * part))
     z = ((x - about.mean) / about.sigma)[untimed:]
-    quiet = len(z) * together * CHARTS / FALSE_ALARM
-    charts = (ewma(z, quiet), cusum(z, quiet)) if len(z) else ()
+    charts: tuple[ControlChart, ...] = ()
+    if len(z):
+        chance = FALSE_ALARM / (together * CHARTS)
+        bounds = chart_limits(len(x), untimed, chance)
+        charts = (ewma(z, bounds[0]), cusum(z, bounds[1]))
     return LotParameter(
         name, unit, units, x, sigma, about, tolerance, cp, cp_sigma, cpk, cpk_sigma,
-        untimed, charts,
+        least, untimed, charts,
     )  # fmt: skip

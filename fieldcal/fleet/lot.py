@@ -1,11 +1,6 @@
 """Analysis of a lot: yield, spread of the units, odd units, shifts and control charts.
 
-Each unit is represented by its last good session. A yield of k good units of n has the
-interval of Jeffreys,
-
-    Beta(k + 1/2, n - k + 1/2)                                                      (1)
-
-Source: Brown, Cai and DasGupta, Statistical Science 16 (2001) 101.
+Each unit is represented by its last good session.
 """
 
 from __future__ import annotations
@@ -15,15 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import betaincinv
 
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import TILTS, group_of
 from fieldcal.core.errors import InputError
 from fieldcal.fleet.capability import LotParameter, lot_parameter
 from fieldcal.fleet.levels import Grouping, groupings
+from fieldcal.fleet.lot_yield import yield_interval
 from fieldcal.fleet.odd import benjamini_hochberg, unit_p_values
 from fieldcal.fleet.shifts import Shift, find_shifts
+from fieldcal.fleet.units import is_unit, latest_session_per_unit, serials_alike
 from fieldcal.history.sessions import LEVELS, StoredSession, parameter_values
 
 MIN_UNITS = 5
@@ -48,12 +44,12 @@ class OddUnit:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """A control chart beyond its limits: at which unit, and since which."""
+    """A control chart beyond its limits, and the first unit after the mean's change."""
 
     parameter: str
     chart: str
     at: str
-    since: str | None
+    since: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +61,8 @@ class LotAnalysis:
     sessions, failed : number of sessions, and of those without a result
     units : session that represents each unit, in the order of time
     good, judged : number of good units (GO, if that was judged), and of all units
-    yield_share : good / judged, with the ends of its 95 % interval (1)
+    unmeasured : units of `judged` that have sessions but no result
+    yield_share : good / judged, with the ends of its 95 % interval
     parameters : parameters by name
     odd : odd units at the false-discovery rate
     false_discovery_rate : accepted rate of false discoveries among odd units
@@ -79,6 +76,7 @@ class LotAnalysis:
     units: tuple[StoredSession, ...]
     good: int
     judged: int
+    unmeasured: int
     yield_share: tuple[float, float, float]
     parameters: Mapping[str, LotParameter]
     odd: tuple[OddUnit, ...]
@@ -107,6 +105,7 @@ class LotAnalysis:
             "yield": {
                 "good": self.good,
                 "of": self.judged,
+                "of_them_without_result": self.unmeasured,
                 "share": share,
                 "share_95": [low, high],
             },
@@ -162,7 +161,7 @@ def analyse_lot(
         If fewer than `MIN_UNITS` units have a result.
 
     """
-    units = latest_session_per_unit(sessions)
+    units = [one for one in latest_session_per_unit(sessions) if is_unit(one)]
     useful = [one for one in units if one.good]
     if len(useful) < MIN_UNITS:
         raise InputError(
@@ -199,6 +198,7 @@ def analyse_lot(
         tuple(useful),
         sum(judged),
         len(judged),
+        sum(one.good is None for one in units),
         yield_interval(sum(judged), len(judged)),
         parameters,
         tuple(_find_odd_units(useful, parameters, rate)),
@@ -208,37 +208,22 @@ def analyse_lot(
     )
 
 
+def serials_sentence(found: LotAnalysis) -> str:
+    """Sentence about serial numbers that may be of one unit; empty without any."""
+    alike = serials_alike(found.units)
+    if not alike:
+        return ""
+    named = "; ".join(" and ".join(some) for some in alike)
+    return (
+        f"serial numbers that differ by upper and lower case only: {named}. Each counts"
+        " as a unit; if they are one, correct session.toml and run fieldcal batch again"
+    )
+
+
 def untimed_sentence(found: LotAnalysis) -> str:
     """Sentence about units whose time is unknown."""
     which = "1 unit" if found.untimed == 1 else f"{found.untimed} units"
     return f"{which} of unknown time: not in the control charts"
-
-
-def latest_session_per_unit(sessions: Sequence[StoredSession]) -> list[StoredSession]:
-    """Return each unit's last session with a good result, or else its last session."""
-    units: dict[str, StoredSession] = {}
-    for one in sorted(sessions, key=_time_order):
-        key = one.serial or one.folder
-        before = units.pop(key, None)
-        kept = before is not None and before.good and not one.good
-        units[key] = before if before is not None and kept else one
-    return sorted(units.values(), key=_time_order)
-
-
-def yield_interval(good: int, count: int) -> tuple[float, float, float]:
-    """Share of good units, and the lower and upper end of its 95 % interval, (1).
-
-    >>> [round(x, 3) for x in yield_interval(9, 10)]
-    [0.9, 0.619, 0.989]
-    """
-    a, b = good + 0.5, count - good + 0.5
-    low = 0.0 if not good else float(betaincinv(a, b, 0.025))
-    high = 1.0 if good == count else float(betaincinv(a, b, 0.975))
-    return good / count, low, high
-
-
-def _time_order(one: StoredSession) -> tuple[str, str]:
-    return (one.taken_at or "", one.folder)
 
 
 def _stated_levels(useful: Sequence[StoredSession]) -> list[dict[str, str]]:
@@ -295,8 +280,8 @@ def _find_alarms(one: LotParameter, useful: Sequence[StoredSession]) -> list[Ala
             one.name,
             chart.name,
             named(chart.alarm),
-            None if chart.onset is None else named(chart.onset),
+            named(chart.onset),
         )
         for chart in one.charts
-        if chart.alarm is not None
+        if chart.alarm is not None and chart.onset is not None
     ]

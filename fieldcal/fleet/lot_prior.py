@@ -34,8 +34,9 @@ from fieldcal.calibration.names import group_of
 from fieldcal.core.errors import InputError
 from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.core.samples import Array
-from fieldcal.fleet.lot import MIN_UNITS, latest_session_per_unit
+from fieldcal.fleet.lot import MIN_UNITS
 from fieldcal.fleet.spread import WIDER, UnitDistribution, estimate_distribution
+from fieldcal.fleet.units import latest_session_per_unit
 from fieldcal.history.sessions import StoredSession, parameter_values
 
 KEPT_DRAWS, DROPPED_DRAWS = 2000, 200

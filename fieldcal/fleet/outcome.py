@@ -26,6 +26,7 @@ from fieldcal.evaluation.solution import PreparedSession, solve_prepared
 from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration
+from fieldcal.session.description import with_bare_names
 from fieldcal.session.folder import DESCRIPTION, Session
 from fieldcal.session.recorded_part import recorded_part
 
@@ -82,7 +83,7 @@ class SessionTask:
                 f"{name}: {type(error).__name__}: {error}; see fieldcal verify, or"
                 " report this with the session"
             )
-        return StoredSession(folder, fingerprint=mark, error=said)
+        return failed_session(folder, said, mark)
 
     def _process(self, folder: Path) -> StoredSession:
         session, repaired = with_repaired_bytes(Session.open(folder))
@@ -104,12 +105,32 @@ class SessionTask:
         return replace(
             session_of_calibration(folder, found, taken_at, part),
             serial=str(session.about.device.get("serial", "")),
-            levels=levels_of(session),
+            levels=levels_of(session.about.raw),
             diagnosis=diagnosis,
             reduced=None
             if explanation is None
             else reduce_session(explanation).to_bytes(),
         )
+
+
+def failed_session(
+    folder: str, error: str, fingerprint: str | None = None
+) -> StoredSession:
+    """Record of a session without a result, with its device as session.toml states it.
+
+    A unit whose session failed is a unit of its lot. What session.toml does not state,
+    or if it is not TOML, is unknown.
+    """
+    raw: Mapping[str, Any] = {}
+    with suppress(FieldcalError, OSError, ValueError):
+        raw = with_bare_names(
+            load_toml((Path(folder) / DESCRIPTION).read_text("utf-8"))
+        )
+    tables = {name: t for name, t in raw.items() if isinstance(t, Mapping)}
+    serial = tables.get("device", {}).get("serial", "")
+    return StoredSession(
+        folder, str(serial), levels_of(tables), fingerprint=fingerprint, error=error
+    )
 
 
 def _limits_in_plan(folder: Path) -> str:
@@ -124,9 +145,8 @@ def _limits_in_plan(folder: Path) -> str:
     return ""
 
 
-def levels_of(session: Session) -> dict[str, str]:
-    """Return the levels that session.toml states: model, lot, station, operator."""
-    raw: Mapping[str, Any] = session.about.raw
+def levels_of(raw: Mapping[str, Any]) -> dict[str, str]:
+    """Levels in the tables of a session.toml: model, lot, station, operator."""
     device, site = raw.get("device", {}), raw.get("site", {})
     said = {
         "model": device.get("model"),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Connection, Row, and_, select, update
+from sqlalchemy import Connection, Row, and_, delete, select, update
 
+from fieldcal.core.file_names import storable_text
 from fieldcal.core.recorded_part import RecordedPart
-from fieldcal.history.tables import SESSION
+from fieldcal.history.tables import PARAMETER, REDUCED_ROWS, SESSION
 
 
 def supersede(db: Connection, number: int, serial: str, part: RecordedPart) -> None:
@@ -33,6 +35,53 @@ def supersede(db: Connection, number: int, serial: str, part: RecordedPart) -> N
         db.execute(here.values(accepted=True))
     there = update(SESSION).where(same)
     db.execute(there.values(accepted=False, superseded=True))
+
+
+def replacing_folders(db: Connection) -> dict[str, list[str]]:
+    """Folders of the rows that count, by the folder of the row that they replace."""
+    own, other = SESSION.alias(), SESSION.alias()
+    query = select(own.c.folder, other.c.folder).where(
+        own.c.superseded,
+        ~other.c.superseded,
+        other.c.recording == own.c.recording,
+        other.c.part_start < own.c.part_end,
+        other.c.part_end > own.c.part_start,
+    )
+    found: dict[str, list[str]] = {}
+    for folder, instead in db.execute(query):
+        found.setdefault(folder, []).append(instead)
+    return found
+
+
+def withdraw(db: Connection, folders: Sequence[str]) -> None:
+    """Delete the rows of folders; what one of them superseded counts again.
+
+    If several rows of the same samples are left, the one counts that names its device,
+    and of those the last one. It is accepted if the deleted one was.
+    """
+    here = SESSION.c.folder.in_([storable_text(one) for one in folders])
+    gone = db.execute(select(SESSION).where(here)).all()
+    for table in (PARAMETER, REDUCED_ROWS):
+        db.execute(delete(table).where(table.c.session.in_([row.id for row in gone])))
+    db.execute(delete(SESSION).where(here))
+    for row in gone:
+        if row.recording is not None and not row.superseded:
+            _reinstate(db, row.recording, bool(row.accepted))
+
+
+def _reinstate(db: Connection, recording: str, accepted: bool) -> None:
+    """Let rows of a recording count again that no row replaces any more."""
+    same = and_(SESSION.c.recording == recording, SESSION.c.result.is_not(None))
+    order = (SESSION.c.superseded, SESSION.c.serial == "", SESSION.c.id.desc())
+    counting: list[RecordedPart] = []
+    for row in db.execute(select(SESSION).where(same).order_by(*order)).all():
+        part = part_of_row(row)
+        if part is None or any(part.overlaps(one) for one in counting):
+            continue
+        counting.append(part)
+        if row.superseded:
+            values = {"superseded": False, "accepted": accepted}
+            db.execute(update(SESSION).where(SESSION.c.id == row.id).values(**values))
 
 
 def part_of_row(row: Row[Any]) -> RecordedPart | None:

@@ -135,7 +135,8 @@ def store_session(db: Connection, one: StoredSession) -> None:
     here = SESSION.c.folder == one.folder
     if one.result is None:
         row = {"fingerprint": one.fingerprint, "error": one.error}
-        if db.execute(update(SESSION).where(here).values(row)).rowcount:
+        has_result = and_(here, SESSION.c.result.is_not(None))
+        if db.execute(update(SESSION).where(has_result).values(row)).rowcount:
             return
     number = _replaced_row(db, here, _row(one))
     if one.part is not None and one.result is not None:
@@ -199,7 +200,7 @@ def parse_filters(words: Iterable[str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a word is no condition, or has no date where one belongs.
+        If a word is no condition or repeats one, or has no date where one belongs.
 
     """
     found = {}
@@ -210,7 +211,12 @@ def parse_filters(words: Iterable[str]) -> dict[str, str]:
                 f"{word}: is no condition; write one of {', '.join(FILTERS)} and a"
                 " value, as in lot=7 or since=2026-03-01"
             )
-        found[name] = _parse_date(word, value) if name in TIMES else value
+        if name in found:
+            raise InputError(
+                f"{word}: {name} is given twice; a session has one, so ask for one at a"
+                " time"
+            )
+        found[name] = _parse_date(word, value) if name in TIMES else value.strip()
     return found
 
 
@@ -267,6 +273,13 @@ def find_sessions(
         blobs = select(REDUCED_ROWS).join(SESSION).where(and_(True, *some))
         kept = {r.session: r.data for r in db.execute(blobs)}
     return [_session_of_row(r, parameters.get(r.id, {}), kept.get(r.id)) for r in rows]
+
+
+def names_in_store(db: Connection, level: str) -> list[str]:
+    """Names that sessions in the store state of a level, or their serial numbers."""
+    column = SESSION.c[level]
+    query = select(column).distinct().where(column.is_not(None), column != "")
+    return sorted(str(name) for name in db.execute(query).scalars())
 
 
 def untimed_sentence(db: Connection, wanted: Mapping[str, str]) -> str:

@@ -15,6 +15,7 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from fieldcal.core.errors import FieldcalError
+from fieldcal.core.escaping import escape_line
 from fieldcal.run.page import server as page
 from fieldcal.service import openapi
 from fieldcal.service.jobs import (
@@ -28,6 +29,9 @@ from fieldcal.service.queue import JobQueue
 from fieldcal.service.work import IMPORT_OPTIONS, REPORT_FILE
 
 FILES = Path(__file__).parent / "files"
+
+LONGEST_KEY = 40
+"""Largest length of an unknown option's name that is repeated, characters."""
 
 LONGEST_OPTION = 200
 """Largest length of an option's value, characters."""
@@ -97,9 +101,14 @@ class SessionsApi:
         return JSONResponse(self.job_document(job)) if job else _not_found()
 
     async def delete_job(self, request: Request) -> Response:
-        """Delete a job."""
+        """Delete a job, with its files and its result in the store."""
         number = request.path_params["id"]
-        found = await run_in_threadpool(self.jobs.remove, number)
+        try:
+            found = await run_in_threadpool(self.queue.delete, number)
+        except FieldcalError:
+            return _error_response(
+                503, "its result cannot be taken out of the store now: try again later"
+            )
         return Response(status_code=204) if found else _not_found()
 
     async def get_document(self, request: Request) -> Response:
@@ -147,6 +156,11 @@ def create_app(jobs: JobStore, queue: JobQueue) -> Starlette:
     )
 
 
+def _shown(key: str) -> str:
+    """The beginning of a text of a request, as it can be displayed."""
+    return escape_line(key[:LONGEST_KEY])
+
+
 def _request_fault(name: str, said: dict[str, str]) -> str:
     """Fault in the file name and options of an upload; empty if there is none."""
     if not FILE_NAME.fullmatch(name):
@@ -157,7 +171,7 @@ def _request_fault(name: str, said: dict[str, str]) -> str:
     for key, value in said.items():
         if key not in IMPORT_OPTIONS:
             known = ", ".join(IMPORT_OPTIONS)
-            return f"there is no option of this name; there are {known}"
+            return f"{_shown(key)}: there is no option of this name; there are {known}"
         if not value or len(value) > LONGEST_OPTION or not value.isprintable():
             return f"{key}: is empty, too long or no text"
     return ""

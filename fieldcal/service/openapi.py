@@ -107,7 +107,8 @@ def openapi_document() -> dict[str, Any]:
                 "get": {"summary": "How far a session is.",
                         "responses": {"200": _answer("The session.", job), **missing}},
                 "delete": {"summary": "Take a session away with all that is its.",
-                           "responses": {"204": _answer("It is gone."), **missing}},
+                           "responses": {"204": _answer("It is gone."), **missing,
+                                         "503": _answer("The store is away.")}},
             },
             DOCUMENT_PATH: {
                 "parameters": [one, wanted],

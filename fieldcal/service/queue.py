@@ -13,8 +13,9 @@ from fieldcal.core.errors import FieldcalError
 from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
+from fieldcal.history.repeats import withdraw
 from fieldcal.history.sessions import StoredSession
-from fieldcal.service.jobs import Job, JobStore
+from fieldcal.service.jobs import SESSION_FOLDER, Job, JobStore
 from fieldcal.service.work import JobTask, without_paths
 
 RETRY_INTERVAL = 10.0
@@ -40,6 +41,7 @@ class JobQueue:
         self.jobs, self.database, self.pool = jobs, database, pool
         self.task = task or JobTask(jobs.bounds)
         self._come, self._over = threading.Event(), False
+        self._storing = threading.Lock()
         self._thread = threading.Thread(target=self._work, daemon=True)
 
     def __enter__(self) -> JobQueue:
@@ -55,6 +57,25 @@ class JobQueue:
     def notify(self) -> None:
         """Tell the queue that there is a job."""
         self._come.set()
+
+    def delete(self, number: str) -> bool:
+        """Delete a job with its files and its result in the store.
+
+        Returns whether there was one.
+
+        Raises
+        ------
+        FieldcalError
+            If the store cannot be written; then nothing is deleted.
+
+        """
+        folder = self.jobs.folder(number)
+        mine = [str(folder), str(folder / SESSION_FOLDER)]
+        with self._storing:
+            if self.jobs.get(number) is None:
+                return False
+            self.database.run(lambda db: withdraw(db, mine), write=True)
+            return self.jobs.remove(number)
 
     def _work(self) -> None:
         while not self._over:
@@ -73,9 +94,10 @@ class JobQueue:
         folder = self.jobs.folder(job.id)
         for made in run_tasks([str(folder)], self.task, self.pool):
             one = made.value or StoredSession(made.item, error=made.error)
-            if self.jobs.get(job.id) is None:
-                continue  # deleted meanwhile: nothing of it is kept
-            said = one.error if one.error is not None else self._store(job, one)
+            with self._storing:
+                if self.jobs.get(job.id) is None:
+                    continue  # deleted meanwhile: nothing of it is kept
+                said = one.error if one.error is not None else self._store(job, one)
             log = Path(folder / "import.log")
             with suppress(OSError):
                 job = self.jobs.update(job, log=log.read_text("utf-8"))

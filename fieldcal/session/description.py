@@ -41,6 +41,12 @@ from fieldcal.session.units import UNITS, full_scales, output_gauge, parse_nomin
 FORMAT_VERSION = 1
 """Version of the format of session.toml."""
 
+NAMES = {
+    "device": ("name", "serial", "model", "lot"),
+    "site": ("station", "operator"),
+}
+"""Names by which sessions are grouped, by table."""
+
 
 @dataclass(frozen=True, slots=True)
 class Description:
@@ -260,6 +266,7 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
     """
     if wrong := schema_fault(raw, validator("session")):
         raise InputError(wrong)
+    raw = with_bare_names(raw)
     device, table = raw.get("device", {}), raw.get("site", {})
     given = raw.get("units", {})
     units = {k: given.get(k, next(iter(known))) for k, known in UNITS.items()}
@@ -311,6 +318,19 @@ def with_added_positions(
     return parse_description(
         {**about.raw, "position": [*about.raw.get("position", ()), *more]}
     )
+
+
+def with_bare_names(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables, with names of device, lot and station without blanks around them.
+
+    A blank from a bar-code reader or a spreadsheet would make another unit of one.
+    """
+    out = dict(raw)
+    for table, names in NAMES.items():
+        if isinstance(given := raw.get(table), Mapping):
+            bare = {n: v.strip() for n in names if isinstance(v := given.get(n), str)}
+            out[table] = {**given, **bare}
+    return out
 
 
 def _optional_float(value: float | None) -> float | None:

@@ -137,6 +137,20 @@ def test_kalibr_has_matrices_and_densities(tmp_path: Path) -> None:
     assert "nothing for temperature bias" in says
 
 
+def test_what_nothing_shows_is_said_where_a_matrix_must_hold_it(tmp_path: Path) -> None:
+    shown = SensorModel({"gyr_scale": SCALE}, {}, {"gyro_cross_coupling": {"s12": 0.1}})
+    model = SensorModel({"acc_scale": SCALE}, shown=shown)
+    text, says = written("kalibr", tmp_path, model)
+    for one in ("acc_bias", "cross_coupling", "gyr_bias", "gyro_scale"):
+        assert f"# {one}: not shown, as of a perfect sensor\n" in text
+        assert one.replace("_", " ") in says
+    for one in ("acc_scale", "gyr_scale", "gyro_cross_coupling"):
+        assert f"# {one}:" not in text
+    text, says = written("json", tmp_path, model)
+    assert json.loads(text)["assumed"] == ["cross_coupling"]
+    assert "cross coupling: neither recording nor simulator shows it" in says
+
+
 def test_the_virtual_device_takes_its_tables(tmp_path: Path) -> None:
     written("toml", tmp_path)
     device = profile_file.read_profile(tmp_path / "patch.toml")
@@ -155,7 +169,7 @@ def test_json_has_everything_with_its_equation(tmp_path: Path) -> None:
     np.testing.assert_allclose(gyr, GYR)
     warm = found["effects"]["temperature_bias"]
     assert warm["ax"] == 3e-3 and "T" in warm["equation"]
-    assert not says
+    assert says.startswith("gyr scale, gyro cross coupling: neither")
 
 
 def test_what_is_not_changed_stays_where_one_element_holds_several(

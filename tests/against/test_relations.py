@@ -1,8 +1,12 @@
 """Evidence of one effect in two sessions, against dense Gaussian densities."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from fieldcal.against.causes import DecidedCauses, aliases_of
 from fieldcal.against.joint import (
     EffectInformation,
     evidence_of_proportional,
@@ -52,6 +56,42 @@ def over_sizes(values: list[float]) -> float:
 
 
 REAL, SIM = rows(np.array([0.02, -0.01]), 1), rows(np.array([0.015, 0.0]), 2)
+
+
+def test_the_aliases_of_an_effect_are_those_of_all_recordings_that_have_it() -> None:
+    """An effect is no alias of itself, and a tilt of the simulator is named."""
+
+    def diagnosed(**alternatives: tuple[str, ...]) -> Any:
+        known = {n: dict.fromkeys(a) for n, a in alternatives.items()}
+        posterior = SimpleNamespace(alternatives=known)
+        return SimpleNamespace(explanation=SimpleNamespace(posterior=posterior))
+
+    real = diagnosed(scale_asymmetry=("quadratic", "cross_coupling"))
+    sim = diagnosed(cross_coupling=("base_tilt", "position"))
+    instead = {"cross_coupling": "scale_asymmetry"}
+    both = aliases_of("cross_coupling", [real, sim], instead)
+    assert both == ("scale_asymmetry", "quadratic", "base_tilt")
+    assert aliases_of("cross_coupling", [sim], instead) == ("base_tilt",)
+    assert aliases_of("hum", [real, sim], {}) == ()
+
+
+def test_only_what_both_could_show_is_compared() -> None:
+    def side(**told: EffectInformation) -> Any:
+        return SimpleNamespace(effect_information=told.get)
+
+    inner = np.zeros((2, 2))
+    blind = EffectInformation(inner, np.zeros(2), 0.0)
+    real, sim = (
+        side(tilt=told(*REAL), g=told(*REAL), hum=told(*REAL)),
+        side(tilt=told(*SIM), g=blind),
+    )
+    pairing: Any = SimpleNamespace(widened=(real, sim))
+    found = DecidedCauses(pairing, {}, real, sim)
+    assert [found.both_show(key) for key in ("tilt", "g", "hum")] == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_the_same_effect_in_both_is_that_of_all_rows_together() -> None:

@@ -1,7 +1,9 @@
 """Rows of the table that the terminal shows."""
 
+from dataclasses import replace
+
 from fieldcal.against.result import Difference, RealAndSimulated
-from fieldcal.against.wording import difference_rows
+from fieldcal.against.wording import difference_rows, possible_difference
 from fieldcal.diagnosis.result import Quantity
 
 
@@ -28,3 +30,16 @@ def test_what_happened_often_is_one_row_with_its_largest() -> None:
     assert second[0] == "quadratic, or cross coupling" and second[1] == "added"
     assert second[2] == "x: real none, simulator 0.00200 ± 0.00010"
     assert second[3:] == ("-0.00200 ± 0.00010", "0.90")
+
+
+def test_what_one_of_the_two_cannot_show_is_not_said_to_differ_perhaps() -> None:
+    """A simulator without gyroscopes has neither g-sensitivity nor none."""
+    perhaps = replace(bump(12.0, 1.0), probability=0.75)
+    assert "may differ, with a probability of 0.75" in possible_difference(perhaps)
+    hidden = replace(perhaps, shown=False)
+    said = possible_difference(hidden)
+    assert said.endswith(
+        "is not compared: nothing in the output of the simulator would show it"
+    )
+    said = possible_difference(replace(hidden, direction="added"))
+    assert "in the output of the recording would show it" in said

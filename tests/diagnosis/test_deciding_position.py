@@ -6,10 +6,12 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from session_folders import places, recorded, write_session
 
 from fieldcal.diagnosis import Diagnosis, diagnose
+from fieldcal.diagnosis.wording.deciding_position import median_known
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import parse
@@ -58,3 +60,10 @@ def test_what_an_effect_does_is_the_change_of_the_calibration(tmp_path: Path) ->
     (line,) = found.lines
     assert line.what == "cross coupling" and line.size.startswith("k21 0.00")
     assert line.sure == "above 0.99" and "σ)" in line.does
+
+
+def test_an_output_that_was_not_recorded_has_no_noise_and_no_warning() -> None:
+    rows = np.array([[1.0, np.nan, np.nan], [3.0, np.nan, 5.0], [9.0, np.nan, 7.0]])
+    with np.errstate(all="raise"):
+        found = median_known(rows)
+    np.testing.assert_array_equal(found, [3.0, np.nan, 6.0])

@@ -422,6 +422,20 @@ def test_what_was_not_determined_is_said_not_filled_in_silence(
     for name in ("imu_tk", "kalibr", "ros", "json"):
         says = load_exporter(name).write(some, tmp_path / name)
         assert any("gyr_scale.y" in sentence for sentence in says)
+        for triad in ("accelerometers", "gyroscopes"):
+            said = f"cross-coupling of the {triad} was not determined"
+            assert any(said in sentence for sentence in says)
+            whole_says = load_exporter(name).write(made[0], tmp_path / f"whole {name}")
+            assert not any(said in sentence for sentence in whole_says)
+            for old in tmp_path.glob("whole*"):
+                old.unlink()
+        text = (tmp_path / name).read_text()
+        if name in ("kalibr", "ros"):
+            assert "# gyro_cross_coupling was not determined: 0\n" in text
+    assert json.loads((tmp_path / "json").read_text())["zero"] == [
+        "cross_coupling",
+        "gyro_cross_coupling",
+    ]
     says = load_exporter("ardupilot").write(some, tmp_path / "a.param")
     assert "gyr_bias was not determined: not written" in says
     assert "GYR" not in (tmp_path / "a.param").read_text().partition("INS_")[2]

@@ -44,7 +44,9 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_session(folder, block, held, device=device, site=site)
     broken = root / "x" / "broken"
     shutil.copytree(root / "station 1" / "session", broken)
-    (broken / "session.toml").write_text("[site]\nlatitude_deg = 'north'\n")
+    (broken / "session.toml").write_text(
+        "device = {serial = ' A9', lot = 'L7'}\n[site]\nlatitude_deg = 'north'\n"
+    )
     return root
 
 
@@ -69,8 +71,10 @@ def test_a_tree_is_solved_and_what_is_broken_has_a_row(
     assert len(broken) == 1 and "latitude_deg" in broken[0]["error"]
     assert "x/broken/session.toml" in broken[0]["error"]
     rows = pq.read_table(table).to_pylist()
-    good = {r["serial"]: r for r in rows if r["serial"]}
+    good = {r["serial"]: r for r in rows if not r["error"]}
     assert set(good) == {"A1"} and len(rows) == 2
+    (failed,) = (r for r in rows if r["error"])
+    assert (failed["serial"], failed["lot"]) == ("A9", "L7"), "a unit of its lot"
     assert good["A1"]["lot"] == "L7" and good["A1"]["station"] == "1"
     assert good["A1"]["verdict"] and good["A1"]["go"] is None
 
@@ -89,12 +93,29 @@ def test_a_tree_is_solved_and_what_is_broken_has_a_row(
             db, {"lot": "L7"}, documents=True, reduced=True
         )
     )
-    small = ReducedSession.from_bytes(kept[0].reduced or b"")
+    (mine,) = (one for one in kept if one.serial == "A1")
+    small = ReducedSession.from_bytes(mine.reduced or b"")
     assert {c.effect for c in small.columns} >= {"cross_coupling", "g_sensitivity"}
     assert np.linalg.eigvalsh(small.matrix)[0] > -1e-6 * np.trace(small.matrix)
     np.testing.assert_array_equal(
         ReducedSession.from_bytes(small.to_bytes()).rhs, small.rhs
     )
+
+
+@pytest.mark.usefixtures("inside")
+def test_a_log_file_says_how_far_a_batch_is(
+    tree: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(command, "NOTE_INTERVAL", 0.0)
+    monkeypatch.setattr("fieldcal.fleet.outcome.SessionTask", Quick)
+    call = ["batch", str(tree), "--history", str(tmp_path / "h")]
+    main([*call, "-o", str(tmp_path / "t.parquet")])
+    said = capsys.readouterr().err
+    assert "1 of 3 sessions done, about 0 min left" in said
+    assert "3 of 3 sessions done" in said
 
 
 def test_a_row_has_the_folder_that_was_asked_for(tree: Path, tmp_path: Path) -> None:
@@ -103,6 +124,24 @@ def test_a_row_has_the_folder_that_was_asked_for(tree: Path, tmp_path: Path) -> 
     link.symlink_to(tree / "station 1", target_is_directory=True)
     one = SessionTask()(str(link / "session"))
     assert one.folder == str(link / "session") and one.result is not None
+
+
+def test_what_is_known_of_a_broken_session_is_the_newest(tmp_path: Path) -> None:
+    """A folder that failed is a row of its own until it has a result."""
+    folder, store = tmp_path / "s", Database(tmp_path / "h.sqlite")
+    folder.mkdir()
+
+    def stored() -> sessions.StoredSession:
+        one = SessionTask()(str(folder))
+        store.run(lambda db: sessions.store_session(db, one), write=True)
+        (row,) = store.run(sessions.find_sessions)
+        return row
+
+    (folder / "session.toml").write_text("[device\n")
+    assert (stored().serial, stored().levels) == ("", {})
+    (folder / "session.toml").write_text("device = {serial = 'A7', lot = 'L'}\n")
+    one = stored()
+    assert (one.serial, one.levels) == ("A7", {"lot": "L"}) and one.error
 
 
 def quick(folder: str) -> sessions.StoredSession:
@@ -140,6 +179,34 @@ def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
     with (found[0] / "session.toml").open("a") as file:
         file.write("# mended\n")
     assert batch.unprocessed() == [str(found[0])]
+
+
+def test_a_session_counts_again_if_the_copy_that_replaced_it_is_gone(
+    tree: Path, tmp_path: Path
+) -> None:
+    first, second = tmp_path / "t" / "a", tmp_path / "t" / "b"
+    shutil.copytree(tree / "station 1" / "session", first)
+    data = Database(tmp_path / "h")
+
+    def left() -> list[str]:
+        every = SessionBatch(sessions_in([tmp_path / "t"]), SessionTask(), data)
+        return [Path(folder).name for folder in every.unprocessed()]
+
+    def done(folder: Path) -> None:
+        one = SessionTask()(str(folder))
+        data.run(lambda db: sessions.store_session(db, one), write=True)
+
+    done(first)
+    shutil.copytree(first, second)
+    assert left() == ["b"]
+    done(second)
+    assert left() == []
+    shutil.rmtree(second)
+    assert left() == ["a"]
+    done(first)
+    assert left() == []
+    (one,) = data.run(lambda db: sessions.find_sessions(db, once=True))
+    assert one.folder == str(first)
 
 
 @pytest.mark.parametrize("given", [True, False])

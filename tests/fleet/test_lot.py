@@ -17,8 +17,10 @@ from fieldcal.cli import main
 from fieldcal.commands.lot import lot_findings
 from fieldcal.core.errors import InputError
 from fieldcal.fleet.capability import lot_parameter
-from fieldcal.fleet.control import cusum, cusum_limit, ewma, ewma_limit
+from fieldcal.fleet.chart_limits import chart_limits, cusum_limit, ewma_limit
+from fieldcal.fleet.control import WEIGHT, cusum, ewma
 from fieldcal.fleet.lot import LotAnalysis, analyse_lot
+from fieldcal.fleet.lot_yield import yield_sentence
 from fieldcal.fleet.odd import benjamini_hochberg
 from fieldcal.fleet.spread import estimate_distribution
 from fieldcal.history import sessions
@@ -115,17 +117,51 @@ def test_limits_of_sums_are_those_of_published_tables() -> None:
 @pytest.mark.statistical
 def test_charts_alarm_as_seldom_as_they_are_meant_to() -> None:
     rng = np.random.default_rng(4)
-    for chart in (ewma, cusum):
+    for chart, bound in (
+        (ewma, ewma_limit(5000.0, WEIGHT)),
+        (cusum, cusum_limit(5000.0)),
+    ):
         alarms = sum(
-            chart(rng.standard_normal(500), 5000.0).alarm is not None
-            for _ in range(200)
+            chart(rng.standard_normal(500), bound).alarm is not None for _ in range(200)
         )
         assert 0.03 * 200 < alarms < 0.17 * 200, "one in ten is expected"
 
 
+@pytest.mark.parametrize("count", [30, 150])
+def test_charts_about_a_lots_own_mean_alarm_as_often_as_stated(count: int) -> None:
+    """Limits for a known mean are passed by one lot of a thousand, not one of ten."""
+    rng = np.random.default_rng(21)
+    bounds = chart_limits(count, 0, 0.1)
+    alarms = np.zeros(2)
+    for _ in range(400):
+        x = rng.standard_normal(count)
+        z = x - x.mean()
+        charts = ewma(z, bounds[0]), cusum(z, bounds[1])
+        alarms += [chart.alarm is not None for chart in charts]
+    assert ((alarms > 0.06 * 400) & (alarms < 0.15 * 400)).all(), alarms
+
+
+def test_limits_of_lots_just_simulated_and_just_not_agree() -> None:
+    for chance in (0.01, 0.001):
+        simulated = chart_limits(1900, 0, chance)
+        known = chart_limits(2100, 0, chance)
+        assert simulated == pytest.approx(known, rel=0.05)
+        assert simulated[0] < known[0] and simulated[1] < known[1]
+
+
+def test_half_a_lot_shifted_by_twice_its_spread_is_beyond_a_chart() -> None:
+    rng = np.random.default_rng(22)
+    x = 0.02 * rng.standard_normal(60)
+    x[30:] += 0.04
+    one = lot_parameter("acc_bias.x", "m/s^2", np.arange(60), x, np.full(60, 0.01),
+                        BOUNDS, 20)  # fmt: skip
+    chart = one.charts[1]
+    assert chart.alarm is not None and chart.onset is not None
+
+
 def test_a_sum_says_since_when() -> None:
     z = np.concatenate([np.tile([0.2, -0.2], 50), np.full(60, 0.8)])
-    found = cusum(z, 1e4)
+    found = cusum(z, cusum_limit(1e4))
     assert found.alarm is not None and found.alarm < 130
     assert found.onset is not None and abs(found.onset - 100) < 5
     assert np.argmax(np.abs(found.values) > found.limit) == found.alarm
@@ -259,6 +295,41 @@ def test_the_last_good_session_of_a_unit_counts() -> None:
         of(some[:4])
 
 
+def test_a_unit_without_a_result_is_in_the_yield_and_a_broken_folder_is_not() -> None:
+    failed = StoredSession("/s/f", "A99", {"lot": "7"}, error="its samples are cut")
+    again = StoredSession("/s/g", "A1", {"lot": "7"}, error="was sent again, broken")
+    nobody = StoredSession("/s/n", error="is not TOML")
+    found = of([*units(8), failed, again, nobody])
+    assert (found.judged, found.good, found.unmeasured) == (9, 7, 1)
+    assert found.failed == 3
+    said = yield_sentence(found)
+    assert said.startswith("7 of 9: 77.8 % (95 %: ")
+    assert said.endswith("; 1 NO-GO or not good, 1 without a result")
+    assert found.to_json()["yield"]["of_them_without_result"] == 1
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        (["lot=8"], r"lot=8: .* has no session of it; of lot it has 7"),
+        (["lot=7", "lot=8"], "lot is given twice"),
+        (["since=2026-05", "until=2026-04"], "exchange the two"),
+        (["serial=A1", "since=2031"], "no session meets serial=A1 since=2031"),
+    ],
+)
+def test_a_query_that_finds_nothing_says_why(
+    query: list[str],
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    store = Database(tmp_path / "h")
+    for one in units(6):
+        store.run(lambda db, one=one: sessions.store_session(db, one), write=True)  # type: ignore[misc]
+    assert main(["lot", *query, "--history", str(tmp_path / "h")]) == 2
+    assert re.search(said, " ".join(capsys.readouterr().err.split()))
+
+
 def test_a_result_with_a_newer_error_is_a_result() -> None:
     some = units(8)
     some[3] = replace(some[3], error="its samples have changed and cannot be read")
@@ -282,6 +353,38 @@ def test_units_of_unknown_time_are_in_no_chart() -> None:
     assert "5 units of unknown time" in render_lot_page(found, "everything")
     alone = of(unknown)
     assert not alone.alarms and render_lot_page(alone, "everything")
+
+
+def test_the_page_says_of_each_finding_which_unit_and_what_to_do() -> None:
+    some = units(drift=1.5)
+    some[10] = replace(some[10], serial="", folder="/s/folder of ten")
+    text = render_lot_page(of(some), "lot 7")
+    assert "no serial number" in text and "Measure again: folder of ten" in text
+    assert "147 of 150: 98.0 %" in text and "3 NO-GO or not good" in text
+    assert re.search(r"The mean changes at about A(7|8)\d: ask what changed", text)
+    assert "1 drift" in text and "charts in control" in text
+
+
+def test_serial_numbers_alike_but_for_case_are_told() -> None:
+    some = units(8)
+    some[3] = replace(some[3], serial="sn-1")
+    some[5] = replace(some[5], serial="SN-1")
+    found = of(some)
+    assert len(found.units) == 8
+    (said,) = (line for line in lot_findings(found) if "upper and lower case" in line)
+    assert "SN-1 and sn-1" in said and "SN-1 and sn-1" in render_lot_page(found, "7")
+    assert not any("lower case" in line for line in lot_findings(of(units(8))))
+
+
+def test_a_spread_within_the_errors_has_a_bound_of_cpk() -> None:
+    rng = np.random.default_rng(31)
+    x = 0.01 * rng.standard_normal(12)
+    one = lot_parameter("acc_bias.x", "m/s^2", np.arange(12), x, np.full(12, 0.02),
+                        BOUNDS, 1)  # fmt: skip
+    assert one.cpk is None and one.cpk_at_least is not None
+    margin = 0.3 - abs(one.distribution.mean)
+    assert one.cpk_at_least == pytest.approx(margin / 3 / one.distribution.high)
+    assert one.cpk_text.startswith("> ")
 
 
 def test_numbers_of_a_fine_device_do_not_run_together(

@@ -30,6 +30,7 @@ from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.history import database, sessions
 from fieldcal.history.database import Database
 from fieldcal.history.location import StoreLocation
+from fieldcal.history.repeats import withdraw
 from fieldcal.history.sessions import StoredSession
 from fieldcal.history.store import History, earlier_runs
 from fieldcal.history.tables import METADATA, SESSION
@@ -196,6 +197,27 @@ def test_a_copy_without_a_serial_number_does_not_replace_its_device(
     assert History(place).serials() == [("B1", 1, "")], "its number was corrected"
     put(place, StoredSession("/s/4", error="no", part=PART))
     assert History(place).serials() == [("B1", 1, "")], "an error replaces no result"
+
+
+def test_a_session_that_is_withdrawn_leaves_its_copy(tmp_path: Path) -> None:
+    """The copy that was replaced counts again, accepted as the deleted one was."""
+    place = tmp_path / "h"
+    later = replace(PART, start=90.0, end=180.0)
+    put(place, stored(1, part=PART), stored(2, serial="", part=later), stored(5))
+    put(place, stored(3, part=replace(PART, end=180.0)), stored(4, part=later))
+    put(place, stored(3, part=replace(PART, end=180.0)))
+    History(place).accept("A1", 4)
+    assert {r.session for r in History(place).runs("A1")} == {"/s/3", "/s/5"}
+
+    def withdrawn(*folders: str) -> dict[str, bool]:
+        Database(place).run(lambda db: withdraw(db, folders), write=True)
+        return {r.session: r.accepted for r in History(place).runs("A1")}
+
+    found = withdrawn("/s/3", "/s/of nobody")
+    assert found == {"/s/1": True, "/s/4": True, "/s/5": False}
+    assert withdrawn("/s/2") == found, "it did not count"
+    assert set(withdrawn("/s/5", "/s/4")) == {"/s/1"}
+    assert len(everything(place)) == 1
 
 
 def test_of_sessions_with_the_same_samples_the_first_is_used() -> None:

@@ -248,6 +248,39 @@ def test_the_walk_of_a_history_has_the_density_of_its_changes() -> None:
     np.testing.assert_allclose(walk_from_history(earlier), expected, rtol=0.1)
 
 
+def test_summer_and_winter_are_no_walk() -> None:
+    """Ten calibrations, every second 15 K warmer, of a device with 1e-3 a kelvin."""
+    warm = 15.0 * (np.arange(10) % 2 - 0.5)
+    found = []
+    for told in (warm, np.zeros(10)):
+        rng = np.random.default_rng(3)
+        plain = monthly(rng, 10, 1e-7, 1e-4)
+        earlier = [
+            EarlierBias(one.seconds, one.value + 1e-3 * k, one.variance, 1e-3 * w)
+            for one, k, w in zip(plain, warm, told, strict=True)
+        ]
+        found.append(float(np.median(walk_from_history(earlier))) ** 0.5)
+    known, unknown = found
+    assert known < 3e-7 and unknown > 2e-6, "1e-7 an s^1/2 is true"
+
+
+@pytest.mark.statistical
+def test_the_walk_beside_a_coefficient_is_as_likely_as_stated() -> None:
+    rng, ranks = np.random.default_rng(5), []
+    for _ in range(200):
+        plain, warm = monthly(rng, 8, 1e-7, 1e-4), rng.uniform(-15, 15, 8)
+        coefficient = 1e-3 * rng.standard_normal()
+        earlier = [
+            EarlierBias(
+                one.seconds, one.value + coefficient * k, one.variance, 1e-3 * k
+            )
+            for one, k in zip(plain, warm, strict=True)
+        ]
+        ranks.append(float((walk_from_history(earlier) < 1e-14).mean()))
+    assert 0.02 < np.mean(np.array(ranks) > 0.9) < 0.18
+    assert 0.02 < np.mean(np.array(ranks) < 0.1) < 0.18
+
+
 def test_north_is_as_sure_as_the_worst_gyroscope_is_still() -> None:
     good, bad = (averaging_error(drawn(N=n), 0.0, 0.01, 1000.0) for n in (1e-7, 1e-6))
     found = gyrocompass_heading([good, bad], math.radians(60))

@@ -330,7 +330,7 @@ def test_a_device_that_joins_a_session_later_has_each_position_once(
             (0.0, 0.0), (45.0, 5.0), (-45.0, 5.0)
         ]  # fmt: skip
     further = Session.open(companion_folders(tmp_path / "s", 1)[0])
-    assert levels_of(further) == {"lot": "7", "station": "B"}
+    assert levels_of(further.about.raw) == {"lot": "7", "station": "B"}
     assert "serial" not in further.about.device
 
 

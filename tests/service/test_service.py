@@ -169,12 +169,19 @@ def test_what_is_sent_is_done_and_can_be_had_and_taken_away(served: Served) -> N
     assert client.ask(here).status == client.ask(f"{here}/report.html").status == 404
     assert client.ask(here, method="DELETE").status == 404
     assert list(served.jobs.root.iterdir()) == []
+    assert Database(served.jobs.root.parent / "h").run(sessions.find_sessions) == []
 
 
 def test_what_is_bad_says_why_and_not_where(served: Served) -> None:
     served.task.may.set()
     job = served.client.over(served.client.send("x", b"bad").json["id"])
     assert job["state"] == "failed" and job["error"] == "is bad; send another"
+
+
+def test_an_unknown_option_is_named(served: Served) -> None:
+    answer = served.client.send("x", b"1", "&serail=A1")
+    assert answer.status == 400
+    assert answer.json["error"].startswith("serail: there is no option of this name")
 
 
 def test_nobody_is_let_in_without_a_token(served: Served) -> None:

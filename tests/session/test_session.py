@@ -371,3 +371,11 @@ def test_a_column_that_is_there_twice_is_refused(tmp_path: Path) -> None:
         _ = session.block
     with pytest.raises(SessionError, match="two columns gx"):
         list(session.blocks())
+
+
+def test_names_are_the_same_with_blanks_around_them(tmp_path: Path) -> None:
+    toml = "[device]\nserial = ' A7 '\nlot = '7\\t'\n[site]\nstation = '  '\n"
+    toml = toml.replace("'7\\t'", '"7\\t"')
+    about = Session.open(folder(tmp_path / "s", toml)).about
+    assert about.device == {"serial": "A7", "lot": "7"}
+    assert about.raw["site"]["station"] == ""

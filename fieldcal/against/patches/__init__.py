@@ -9,7 +9,7 @@ source.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
@@ -36,6 +36,17 @@ def formats() -> tuple[str, ...]:
 def patch_format(name: str) -> PatchFormat:
     """The module of a format."""
     return cast(PatchFormat, import_module(f"{__name__}.{name}"))
+
+
+def assumed_sentence(names: Sequence[str], where: str) -> list[str]:
+    """Notice about what an element of a file holds although nothing shows it."""
+    if not names:
+        return []
+    what = ", ".join(one.replace("_", " ") for one in names)
+    return [
+        f"{what}: neither recording nor simulator shows it, so {where} has the value of"
+        " a perfect sensor, which is no measured one; write the simulator's own"
+    ]
 
 
 def write(name: str, model: SensorModel, path: Path) -> list[str]:

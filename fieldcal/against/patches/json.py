@@ -3,7 +3,9 @@
     U = bias + matrix f + noise,    W = bias + matrix w + noise                      (1)
 
 and each effect by its parameters and the equation of the catalogue. What is not in the
-file is to stay as it is; instants count from the first sample. Device axes, SI units.
+file is to stay as it is; under "assumed" are elements of bias and matrix that neither
+recording nor simulator shows, with the value of a perfect sensor. Instants count from
+the first sample. Device axes, SI units.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import json
 import sys
 from typing import Any
 
+from fieldcal.against.patches import assumed_sentence
 from fieldcal.against.sensor_model import LINEAR, TRIADS, SensorModel
 from fieldcal.effects import catalogue
 
@@ -30,6 +33,9 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
             out[what] = value
     bias = {t: model.group(f"{t}_bias").tolist() for t in _changed(model, "bias")}
     matrix = {t: model.matrix(t).tolist() for t in _changed(model, "scale")}
+    held = [f"{t}_bias" for t in bias]
+    held += [i for t in matrix for i in (f"{t}_scale", *TRIADS[t])]
+    unknown = model.assumed(held)
     noise = {
         triad: [model.level(f"{triad[0]}{axis}") for axis in "xyz"]
         for triad in TRIADS
@@ -38,6 +44,8 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
     out |= {
         k: v for k, v in (("bias", bias), ("matrix", matrix), ("noise", noise)) if v
     }
+    if unknown:
+        out["assumed"] = unknown
     effects = {
         name: {**values, "equation": equation(name)}
         for name, values in model.effects.items()
@@ -45,7 +53,9 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
     }
     if effects:
         out["effects"] = effects
-    return json.dumps(out, indent=2, allow_nan=False) + "\n", []
+    return json.dumps(out, indent=2, allow_nan=False) + "\n", assumed_sentence(
+        unknown, "the matrix"
+    )
 
 
 def _changed(model: SensorModel, group: str) -> list[str]:

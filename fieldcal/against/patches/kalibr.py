@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.against.sensor_model import LINEAR, SensorModel
+from fieldcal.against.patches import assumed_sentence
+from fieldcal.against.sensor_model import CALIBRATION, LINEAR, SensorModel
 from fieldcal.exporters.kalibr import split_rotation, yaml_array
 
 WHAT = "Kalibr and OpenVINS, imu.yaml"
@@ -34,6 +35,9 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
     if model.rate_hz > 0:
         lines.append(f"update_rate: {model.rate_hz:.6g}")
     if model.calibration or set(model.effects) & set(LINEAR):
+        unknown = model.assumed((*CALIBRATION, *LINEAR))
+        lines += [f"# {one}: not shown, as of a perfect sensor" for one in unknown]
+        says += assumed_sentence(unknown, "the file")
         lines += _linear(model)
     return "\n".join(lines) + "\n", says
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.positions import Position, ladder_settings
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model import thresholds
 from fieldcal.model.causes.planned import rows_at_session_end
@@ -53,6 +54,14 @@ def ladder_extent(positions: Sequence[Position]) -> str:
     return f"within |α| ≤ {a:g}°, |β| ≤ {b:g}°"
 
 
+def median_known(rows: Array) -> Array:
+    """Median of each column (k,); nan for an output that was not recorded."""
+    out = np.full(rows.shape[1], np.nan)
+    known = np.isfinite(rows).any(axis=0)
+    out[known] = np.nanmedian(rows[:, known], axis=0)
+    return out
+
+
 def deciding_position(
     explanation: Explanation, one: str, other: str
 ) -> DecidingPosition | None:
@@ -65,9 +74,9 @@ def deciding_position(
         return None
     states = [_state(explanation, s) for s in (explanation.best.set, instead[other])]
     x = rows.x
-    sd = np.nanmedian(rows.sd, axis=0)
+    sd = median_known(rows.sd)
     sd = sd / np.sqrt(len(x) / len(explanation.dictionary.window_positions))
-    sd = np.hypot(sd, np.nanmedian(rows.window_error, axis=0))
+    sd = np.hypot(sd, median_known(rows.window_error))
     since = explanation.dictionary.since[:, -1:]
     about = explanation.prepared.source.about
     held = [p.degrees for p in about.positions]

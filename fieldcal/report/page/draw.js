@@ -207,7 +207,8 @@ function drawChart(plot) {
   for (const level of spec.levels) {
     const y = s.py(plot.v(level.at));
     el(g, "line", { class: "level", x1: box.x, x2: box.x + box.w, y1: y, y2: y });
-    el(g, "text", { class: "level-name", x: box.x + box.w - 6, y: y - 5, "text-anchor": "end" }, level.label);
+    const beside = y - box.y < 18 ? y + 13 : y - 5; // inside the panel
+    el(g, "text", { class: "level-name", x: box.x + box.w - 6, y: beside, "text-anchor": "end" }, level.label);
   }
   for (const one of plot.series) if (!one.hidden) drawSeries(g, one, s);
 }

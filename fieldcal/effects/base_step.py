@@ -35,6 +35,7 @@ from fieldcal.effects.bias_step import BiasStep
 from fieldcal.physics.effect import NO_SHAPE, Param, Separable
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
+from fieldcal.physics.turned_outputs import change_by_turn
 
 
 class BaseStep(Separable):
@@ -42,6 +43,8 @@ class BaseStep(Separable):
 
     params = (Param("about_x_deg", "deg", 0.3), Param("about_z_deg", "deg", 0.3))
     shapes = (Shape("at_s", "s", -np.inf, np.inf, "instant"),)
+    nonlinear = True
+    turns_device = True
     covariate = "time, along what a tilt of the base does in each position"
     seen_in = "time"
     decided_by = "a position from before the knock once more"
@@ -63,26 +66,38 @@ class BaseStep(Separable):
         """Step function: 0 before the instant, 1 after it."""
         return BiasStep().course(x, shape)
 
+    def _axes(self, x: Experience) -> Array:
+        """Axes of the step in those of the device, (n, 3, 2); zero where it is none."""
+        known = _at_rest_in_known_position(x)
+        rows = np.flatnonzero(known | _at_rest_in_free_position(x))
+        out = np.zeros((len(x), 3, 2))
+        if len(rows):
+            out[rows] = np.where(
+                known[rows, None, None],
+                x.to_device[rows][:, :, [0, 2]],
+                _axes_across(x.f[rows]),
+            )
+        return out
+
     def pattern(self, x: Experience) -> Array:
         """Change of the outputs at rest for a degree about each axis, (n, 6, 2).
 
         Where the angles are not known, the axes are any two across the force.
         """
-        known = _at_rest_in_known_position(x)
-        rows = np.flatnonzero(known | _at_rest_in_free_position(x))
-        out = np.zeros((len(x), 6, 2))
-        if not len(rows):
-            return out
-        axes = np.where(
-            known[rows, None, None],
-            x.to_device[rows][:, :, [0, 2]],
-            _axes_across(x.f[rows]),
-        )
+        axes = self._axes(x)
         # what a rate table adds is tilted with the base
         rate = np.where(x.rate.any(axis=1, keepdims=True), 0.0, x.w)
-        turned = [-np.cross(axes, v[rows, :, None], axis=1) for v in (x.f, rate)]
-        out[rows] = np.deg2rad(1.0) * np.concatenate(turned, axis=1)
+        turned = [-np.cross(axes, v[:, :, None], axis=1) for v in (x.f, rate)]
+        out: Array = np.deg2rad(1.0) * np.concatenate(turned, axis=1)
         return out
+
+    def change_of_outputs(
+        self, x: Experience, values: Array, shape: Mapping[str, float] = NO_SHAPE
+    ) -> Array:
+        """Change by the whole rotation: of one degree, 0.15 mg are of second order."""
+        turn = np.einsum("nik,k->ni", self._axes(x), np.deg2rad(values))
+        rate = np.where(x.rate.any(axis=1, keepdims=True), 0.0, x.w)
+        return change_by_turn(x.f, rate, turn) * self.course(x, shape)[:, None]
 
 
 def _at_rest_in_known_position(x: Experience) -> NDArray[np.bool_]:

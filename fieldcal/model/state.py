@@ -102,8 +102,9 @@ class State:
         for term in self.terms:
             if isinstance(term.effect, Sensor):
                 since_origin = replace(x, since_turn=since[term.origin])
-                design = term.effect.design(since_origin, term.shape or NO_SHAPE)
-                out = out + design @ term.values
+                out = out + term.effect.change_of_outputs(
+                    since_origin, term.values, term.shape or NO_SHAPE
+                )
         return out
 
 

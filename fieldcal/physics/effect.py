@@ -158,9 +158,16 @@ class Motion(Effect):
 
 
 class Sensor(Effect):
-    """An effect on the outputs, linear in its parameters."""
+    """An effect on the outputs, linear in its parameters or nearly so."""
 
     kind = "sensor"
+
+    nonlinear: ClassVar[bool] = False
+    """Whether `change_of_outputs` is more than the design times the parameters."""
+
+    turns_device: ClassVar[bool] = False
+    """Whether it turns the device itself, so that gyroscopes on a later turn begin from
+    where the force then points."""
 
     @abstractmethod
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
@@ -168,6 +175,13 @@ class Sensor(Effect):
 
         Outputs in `samples.CHANNELS` order, m/s^2 and rad/s.
         """
+
+    def change_of_outputs(
+        self, x: Experience, values: Array, shape: Mapping[str, float] = NO_SHAPE
+    ) -> Array:
+        """Change of the six outputs by parameters (k,), (n, 6)."""
+        out: Array = self.design(x, shape) @ values
+        return out
 
 
 class Separable(Sensor):

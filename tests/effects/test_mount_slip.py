@@ -13,6 +13,7 @@ from session_folders import CALM, WIDE, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.core.frames import earth_rate_at_home
+from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Sensor
 from fieldcal.physics.experience import Experience
@@ -55,3 +56,22 @@ def test_a_calibration_of_a_device_that_slips_is_right(
         found = said["parameters"][name]
         off = np.array(found["value"]) - getattr(profile.truth, name)
         assert (np.abs(off) < 4 * np.array(found["sigma"])).all(), name
+
+
+@pytest.mark.parametrize("name", ["mount_slip", "base_step"])
+def test_a_large_turn_is_a_whole_rotation(name: str) -> None:
+    """To the square of the angle, which the design leaves out."""
+    rng, effect = np.random.default_rng(5), catalogue()[name]
+    assert isinstance(effect, Sensor) and effect.nonlinear
+    alpha, beta = rng.uniform(-1.5, 1.5, (2, 6))
+    x = Experience.at_rest(alpha, beta, 9.81, lasts=np.ones(6))
+    values = np.array([3.0, -2.0, 4.0])[: len(effect.params)]
+    turned = effect.change_of_outputs(x, values, {"at_s": -9.0})
+    based = name == "base_step"
+    axes: Array = x.to_device[:, :, [0, 2]] if based else np.tile(np.eye(3), (6, 1, 1))
+    slip = Rotation.from_rotvec(np.deg2rad(axes @ values))
+    np.testing.assert_allclose(turned[:, :3], slip.inv().apply(x.f) - x.f, atol=1e-9)
+    linear = effect.design(x, {"at_s": -9.0}) @ values
+    square = 9.81 * slip.magnitude() ** 2
+    missing = np.linalg.norm((turned - linear)[:, :3], axis=1)
+    assert (missing < 0.51 * square).all() and (missing > 0.05 * square).any()

@@ -20,6 +20,7 @@ from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.turn_rows import TurnRows
+from fieldcal.physics.effect import Sensor
 
 LARGE_INSTABILITY = 4.0
 """Instability, in typical ones, above which causes may hide that show only together."""
@@ -30,8 +31,9 @@ def starting_sets(fit: GaussNewton, search: Search, best: Set) -> Iterator[Set]:
 
     The rows of turns are those of the fit when each set is asked for.
     """
-    if (large := _set_with_large_angle(search)) is not None:
-        yield large
+    for large in (_set_with_large_angle(search), _set_with_large_turn(search)):
+        if large is not None:
+            yield large
     if elsewhere := _positions_elsewhere(fit):
         yield search.sets.evaluate(elsewhere)
     usual = tuple((c, c.variants[0]) for c in fit.dictionary.causes if c.usual)
@@ -68,6 +70,26 @@ def _set_with_large_angle(search: Search) -> Set | None:
         moved = search.offers.accept(empty, offer)
         angles = estimates_by_column(moved.state, sets.dictionary)[group.columns]
         return moved if np.abs(angles).max() >= visible_angle(sets.gram) else None
+    return None
+
+
+def _set_with_large_turn(search: Search) -> Set | None:
+    """Set of one effect that turns the device at an instant, if by a large angle.
+
+    A base that is knocked by a degree is less likely about the base as it stood than a
+    bias that jumps, and whatever else makes up for the length of the force.
+    """
+    sets = search.sets
+    empty = sets.evaluate(())
+    for offer in search.offers.ranked(empty):
+        _, group = offer.member
+        effect = group.effect
+        if not (isinstance(effect, Sensor) and effect.nonlinear):
+            continue
+        turned = search.offers.accept(empty, offer)
+        values = estimates_by_column(turned.state, sets.dictionary)[group.columns]
+        size = np.linalg.norm(np.deg2rad(values))
+        return turned if size >= visible_angle(sets.gram) else None
     return None
 
 

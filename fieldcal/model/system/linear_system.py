@@ -117,7 +117,10 @@ def gram(
         np.zeros((size, 6, 6)),
         index,
     )
-    total = [_add_windows(out, part, values) for part in linear]
+    free = np.zeros(dictionary.width, dtype=bool)
+    for j in np.flatnonzero(dictionary.unoriented):
+        free[dictionary.rotations_of(held[j])] = True
+    total = [_add_windows(out, part, values, free) for part in linear]
     for i, turn in enumerate(turns, len(held)):
         total.append(_add_turn(out, i, turn, values))
     if dictionary.known is not None:
@@ -128,23 +131,32 @@ def gram(
     return replace(out, square=sum(t[0] for t in total), count=sum(t[1] for t in total))
 
 
-def _add_windows(out: Gram, part: LinearRows, values: Array) -> tuple[float, int]:
-    """Add one channel's rows; returns its squares about the means and their number."""
+def _add_windows(
+    out: Gram, part: LinearRows, values: Array, free: NDArray[np.bool_]
+) -> tuple[float, int]:
+    """Add one channel's rows; returns its squares about the means and their number.
+
+    Of the columns `free` (k,), rotations of unknown orientations, only the means are
+    estimated. What such a rotation does within a window, where an effect turns the
+    device there, stays what it is in the state.
+    """
     c, all_ = part.channel, out.index[part.columns]
     selected = all_ >= 0
     at, design = (
         all_[selected],
         part.design if selected.all() else part.design[:, selected],
     )
-    in_state = np.flatnonzero(values[part.columns])
-    white = part.white + part.design[:, in_state] @ values[part.columns[in_state]]
+    in_state = np.where(free[part.columns], 0.0, values[part.columns])
+    white = part.white + part.design @ in_state
+    rotated = part.design @ (values[part.columns] - in_state)
     windows, weight = part.windows, part.info
     mean, middle = part.window_means(design), part.window_means(white)
     inner = design.T @ design - (mean * weight[:, None]).T @ mean
     out.within[np.ix_(at, at)] += inner
     out.rhs[at] += design.T @ white - mean.T @ (weight * middle)
     out.means[windows[:, None], c, at] = mean
-    out.residual[windows, c], out.info[windows, c] = middle, weight
+    out.residual[windows, c] = middle + part.window_means(rotated)
+    out.info[windows, c] = weight
     return float(white @ white) - float(weight @ middle**2), len(white) - len(windows)
 
 

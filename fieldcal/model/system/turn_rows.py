@@ -28,6 +28,7 @@ from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
 from fieldcal.model.system.turn_force_rows import TurnForceRows, settling_amplitudes
+from fieldcal.model.system.window_ends import WindowEnds
 from fieldcal.model.turns.attitude import closures, first_row_of_each, turn_geometry
 from fieldcal.model.turns.turn import Turn
 from fieldcal.model.turns.turn_tracker import TurnTracker, apply_way_effects
@@ -120,9 +121,7 @@ class Turns:
             if isinstance(one, General) and one.sides is not None
         }
         if self.dictionary.unoriented.any():
-            self.means = _window_columns(windows, self.dictionary)
-            self.off = _window_residuals(windows, self.dictionary)
-            self.spread = _window_variances(windows, self.dictionary)
+            self.windows = WindowEnds.of(windows, self.dictionary)
             x, since = select_rows(self.rows.x, self.first), self.dictionary.since
             self.slopes = _output_slopes(state, x, since[:, self.first])
         turns = list(self.tracker.turns(state))
@@ -167,10 +166,11 @@ class Turns:
             if turn.rounding_covariance is None
             else turn.rounding_covariance
         )
-        for p, bent in loose.items():
+        for last, (p, bent) in zip((True, False), loose.items(), strict=False):
             # the force there is the measured one, which may differ from the state's
-            residual = residual - bent @ self.off[p]
-            close = close - bent @ self.means[p][:, index]
+            off = self.windows.residual_at(p, last, values)
+            residual = residual - bent @ off
+            close = close - bent @ self.windows.columns_at(p, last)[:, index]
             ends = ends + bent @ self._force_covariance(p) @ bent.T
         touching = np.abs(close).max(axis=0) > 0
         if general:
@@ -181,8 +181,8 @@ class Turns:
         basis, info = _known_axes(across, ends, self._closure_variance(turn, view))
         close = basis @ close[:, touching]
         closure = basis @ residual + close @ values[index]
-        off = [(basis @ bent) ** 2 for bent in loose.values()]
-        bent = np.sqrt(sum(off, np.zeros((len(basis), 3))))
+        squares = [(basis @ bent) ** 2 for bent in loose.values()]
+        bent = np.sqrt(sum(squares, np.zeros((len(basis), 3))))
         drift = np.abs(basis @ turn.weights(state.scale[3:]).sum(axis=1))
         bent = np.hstack([bent, drift])
         way: Array = np.zeros(0)
@@ -196,7 +196,7 @@ class Turns:
         """Covariance of the accelerometers of a window at the end of a turn, (3, 3)."""
         moved = turned_force(self.rows.x.f[self.first[p]], self.wander[p])
         slope = self.slopes[p]
-        out: Array = np.diag(self.spread[p]) + slope @ moved @ slope.T
+        out: Array = np.diag(self.windows.variances[p]) + slope @ moved @ slope.T
         return out
 
     def _closure_variance(self, turn: Turn, view: RowView) -> float:
@@ -276,34 +276,6 @@ def _known_axes(across: Array, ends: Array, alike: float) -> tuple[Array, Array]
     plane: Array = axes[:, values > 0.5].T
     spread, turned = np.linalg.eigh(plane @ ends @ plane.T)
     return turned.T @ plane, 1 / (np.maximum(spread, 0.0) + alike)
-
-
-def _window_columns(windows: Sequence[LinearRows], d: Dictionary) -> Array:
-    """Columns of the accelerometers in the mean of each window, (p, 3, k)."""
-    out = np.zeros((len(d.window_positions), 3, d.width))
-    for part in windows:
-        if part.channel < 3:
-            table = part.window_means(part.design)
-            out[part.windows[:, None], part.channel, part.columns] = table
-    return out
-
-
-def _window_residuals(windows: Sequence[LinearRows], d: Dictionary) -> Array:
-    """Recorded less calculated of the accelerometers' mean in each window, (p, 3)."""
-    out = np.zeros((len(d.window_positions), 3))
-    for part in windows:
-        if part.channel < 3:
-            out[part.windows, part.channel] = part.window_means(part.white)
-    return out
-
-
-def _window_variances(windows: Sequence[LinearRows], d: Dictionary) -> Array:
-    """Variance of the accelerometers' mean in each window, (p, 3)."""
-    out = d.window_error[:, :3] ** 2
-    for part in windows:
-        if part.channel < 3:
-            out[part.windows, part.channel] += 1 / part.info
-    return out
 
 
 def _output_slopes(state: State, x: Experience, since: Array) -> Array:

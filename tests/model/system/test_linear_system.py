@@ -284,3 +284,38 @@ def test_a_force_that_is_turned_aside_stays_as_long() -> None:
     np.testing.assert_array_equal(turned[~free], x.f[~free])
     cosine = (turned[free] * x.f[free]).sum(axis=1) / np.square(x.f[free]).sum(axis=1)
     np.testing.assert_allclose(np.tan(np.arccos(cosine)), 0.05, rtol=1e-6)
+
+
+def test_a_free_rotation_stays_in_the_state_what_it_is_within_a_window() -> None:
+    """Its mean alone is estimated, against one long regression about the same state.
+
+    Where an effect turns the device amid a window, the rotation's column changes there.
+    """
+    x = rows((2, 5))
+    d, rng = dictionary(x), np.random.default_rng(4)
+    system = WindowSystem(rows_of(x, rng.normal(size=(len(x), 6))), d)
+    knock = Term(EFFECTS["base_step"], np.array([2.0, -3.0]), {"at_s": float(x.t[5])})
+    state = replace(away(x), terms=(knock,))
+    linear = system.linearised(state)
+    free = np.r_[d.rotations_of(2), d.rotations_of(5)]
+    values = np.zeros(d.width)
+    values[free] = rng.normal(0, 0.1, len(free))
+    values[d.bias : d.bias + 6] = rng.normal(0, 0.1, 6)
+    moved = values.copy()
+    moved[free] = 0.0
+    found, within = gram(linear, d, values), 0.0
+    for part in linear:
+        design = part.design
+        about = part.white + design @ moved[part.columns]
+        rotated = part.white + design @ values[part.columns]
+        for w, start in zip(part.windows, part.starts, strict=True):
+            at = np.flatnonzero(part.window == w)
+            assert at[0] == start
+            weight = part.weight[at]
+            mean = weight @ rotated[at] / (weight**2).sum()
+            assert found.residual[w, part.channel] == pytest.approx(mean)
+            middle = weight @ about[at] / (weight**2).sum()
+            within += float(((about[at] - weight * middle) ** 2).sum())
+    assert found.square == pytest.approx(within)
+    touched = np.abs(np.ptp(linear[0].design[x.position == 2], axis=0)) > 1e-9
+    assert touched[np.isin(linear[0].columns, free)].any(), "it changes in a window"

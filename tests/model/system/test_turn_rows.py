@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_sessions import SD, dictionary, ladder, nominal, rows_of
+from small_sessions import dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
@@ -40,26 +40,6 @@ def test_the_information_of_a_closure_is_what_its_covariance_leaves(
     whole = across @ (cov + 0.25 * np.eye(3)) @ across
     expected = np.linalg.pinv(whole, rcond=1e-9)
     np.testing.assert_allclose(basis.T @ np.diag(info) @ basis, expected, atol=1e-9)
-
-
-def test_columns_and_variances_of_the_means_of_windows() -> None:
-    d = dictionary(X, common=2e-3)
-    rows = rows_of(X, np.zeros((len(X), 6)))
-    rows.sd[:] = SD * RNG.uniform(0.5, 2.0, (len(X), 6))
-    linear = WindowSystem(rows, d).linearised(nominal())
-    means, spread = (
-        turn_rows._window_columns(linear, d),
-        turn_rows._window_variances(linear, d),
-    )
-    for p in range(9):
-        at = X.position == p
-        for c in range(3):
-            weight = 1 / rows.sd[at, c] ** 2
-            expected = np.zeros(d.width)
-            table = linear[c].design[at] / linear[c].weight[at, None]
-            expected[linear[c].columns] = weight @ table / weight.sum()
-            np.testing.assert_allclose(means[p, c], expected, atol=1e-12)
-            assert spread[p, c] == pytest.approx(4e-6 + 1 / weight.sum())
 
 
 def turn(way: Array, design: Array) -> TurnRows:

@@ -1,0 +1,73 @@
+"""What the windows say at the ends of turns, against means written out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from small_sessions import SD, dictionary, ladder, nominal, rows_of
+
+from fieldcal.core.samples import Array
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.system.window_ends import WindowEnds
+from fieldcal.model.system.window_rows import WindowSystem
+
+X = ladder()
+RNG = np.random.default_rng(8)
+
+
+@pytest.fixture(scope="module")
+def read() -> tuple[Dictionary, Array, list[Any], WindowEnds]:
+    """Dictionary, standard deviations, linearised rows and what is read from them."""
+    d = dictionary(X, common=2e-3)
+    rows = rows_of(X, RNG.normal(size=(len(X), 6)))
+    rows.sd[:] = SD * RNG.uniform(0.5, 2.0, (len(X), 6))
+    linear = WindowSystem(rows, d).linearised(nominal())
+    return d, rows.sd, linear, WindowEnds.of(linear, d)
+
+
+Read = tuple[Dictionary, Array, list[Any], WindowEnds]
+
+
+def test_columns_residuals_and_variances_of_the_means_of_windows(read: Read) -> None:
+    d, sd, linear, found = read
+    for p in range(9):
+        at = X.position == p
+        for c in range(3):
+            weight = 1 / sd[at, c] ** 2
+            expected = np.zeros(d.width)
+            table = linear[c].design[at] / linear[c].weight[at, None]
+            expected[linear[c].columns] = weight @ table / weight.sum()
+            np.testing.assert_allclose(found.means[p, c], expected, atol=1e-12)
+            white = linear[c].white[at] / linear[c].weight[at]
+            assert found.residuals[p, c] == pytest.approx(weight @ white / weight.sum())
+            assert found.variances[p, c] == pytest.approx(4e-6 + 1 / weight.sum())
+
+
+def test_a_base_that_is_knocked_goes_with_the_turn_from_the_row_at_its_end(
+    read: Read,
+) -> None:
+    """Only what turns the device does; a bias that jumps is taken off with its mean."""
+    d, _, linear, found = read
+    knocked = [c for c in d.causes if c.name == "base_step"]
+    columns = np.unique([g.columns for c in knocked for g in c.variants])
+    assert len(columns) and np.array_equal(found.turning, columns)
+    values = RNG.normal(size=d.width)
+    amid = 0
+    for p in range(9):
+        rows = np.flatnonzero(X.position == p)
+        for last, row in ((False, rows[0]), (True, rows[-1])):
+            for c in range(3):
+                there = np.zeros(d.width)
+                table = linear[c].design[row] / linear[c].weight[row]
+                there[linear[c].columns] = table
+                there[np.setdiff1d(np.arange(d.width), columns)] = 0.0
+                taken = found.columns_at(p, last)[c]
+                expected = found.means[p, c] - there
+                np.testing.assert_allclose(taken, expected, atol=1e-12)
+                amid += bool(np.abs(taken[columns]).max() > 1e-3)
+                off = found.residual_at(p, last, values)[c]
+                expected_off = found.residuals[p, c] + there @ values
+                assert off == pytest.approx(expected_off)
+    assert amid, "some instant lies within a window"

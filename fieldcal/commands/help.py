@@ -9,8 +9,10 @@ import argparse
 import re
 import sys
 from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
+from fieldcal.commands.path_argument import path_argument
 from fieldcal.core.errors import InputError
 
 EXIT_INTERNAL_ERROR, EXIT_INTERRUPTED = 70, 130
@@ -49,6 +51,7 @@ class CommandParser(argparse.ArgumentParser):
         super().__init__(
             formatter_class=argparse.RawDescriptionHelpFormatter, **options
         )
+        self.register("type", Path, path_argument)  # of all that say type=Path
         self._example, self._rare = f"example:\n{example.rstrip()}", rare
         if rare:
             self.add_argument(

@@ -181,3 +181,26 @@ def test_where_no_file_can_be_written_the_place_is_said_at_once(
     monkeypatch.setattr("fieldcal.commands.verify.run", lambda _: 1 // 0)
     assert main(["verify", "x"]) == 70
     assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "which"),
+    [
+        (["run", "--virtual", "-o", ""], "-o/--output"),
+        (["solve", ""], "SESSION"),
+        (["diagnose", "one", "  "], "SESSION"),
+    ],
+)
+def test_an_empty_name_is_not_the_current_folder(
+    words: list[str],
+    which: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """As of a variable of the shell that is not set."""
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert f"{which}: the name is empty" in said and "write ." in said
+    assert not list(tmp_path.iterdir())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -126,13 +127,26 @@ def block_of(table: Array) -> Block:
 
 
 def compared(
-    number: int, seed: int, lag: float = 0.0, jitter: float = 0.0
-) -> tuple[Drawn, Match]:
-    """A drawn device held against the motion that it went through."""
+    number: int,
+    seed: int,
+    lag: float = 0.0,
+    jitter: float = 0.0,
+    seconds: float = SECONDS,
+    hz: float = HZ,
+) -> tuple[Drawn, Match, float]:
+    """A drawn device held against the motion that it went through.
+
+    Returns
+    -------
+    What was drawn, what was found, and the processor time that it took, s.
+
+    """
     one, drive = drawn(number, seed, lag, jitter), Drive(seed + number)
-    real = block_of(recorded(drive, one.device, SECONDS, HZ))
-    sim = block_of(recorded(drive, {}, SECONDS + 20, HZ))
-    return one, compare_in_motion((real, ABOUT), sim, ("recording", "simulator"))
+    real = block_of(recorded(drive, one.device, seconds, hz))
+    sim = block_of(recorded(drive, {}, seconds + 20, hz))
+    start = time.process_time()
+    found = compare_in_motion((real, ABOUT), sim, ("recording", "simulator"))
+    return one, found, time.process_time() - start
 
 
 def pulls(one: Drawn, found: Match) -> list[float]:

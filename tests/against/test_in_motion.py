@@ -64,7 +64,7 @@ def number(found: Match, name: str, parameter: str) -> tuple[float, float]:
     ],
 )
 def test_what_was_drawn_comes_back_within_its_uncertainty(kind: int) -> None:
-    one, found = compared(kind, 7_100)
+    one, found, _ = compared(kind, 7_100)
     effects = {d.id for d in found.differences} - CALIBRATION
     assert effects == ({one.kind} if one.kind else set())
     off = np.array(pulls(one, found))
@@ -116,7 +116,7 @@ def test_several_at_once_with_late_gyroscopes_off_the_centre(true: Block) -> Non
 @pytest.mark.statistical
 def test_time_constants_come_back_within_their_uncertainty() -> None:
     which, off = KINDS.index("bandwidth"), []
-    for one, found in (compared(which, 7_300 + 50 * k) for k in range(4)):
+    for one, found, _ in (compared(which, 7_300 + 50 * k) for k in range(4)):
         told = {d.id for d in found.differences} - CALIBRATION
         assert told == {"bandwidth"}
         off += [

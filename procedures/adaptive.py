@@ -118,7 +118,13 @@ def _position_gains(
     refused: Collection[tuple[float, float] | None],
 ) -> tuple[PositionGains | None, list[Position]]:
     """Expected gain of each remaining position; None if it cannot be calculated."""
-    places = [p for p in candidate_positions(about) if p.degrees not in refused]
+    taken = {p.degrees for p in positions} - set(refused)
+    places = [
+        p
+        for p in candidate_positions(about)
+        if p.degrees not in refused
+        and not _out_of_reach(p.degrees, [r for r in refused if r], taken)
+    ]
     explanation = so_far.explanation
     if explanation is None or not places:
         return None, places
@@ -128,6 +134,29 @@ def _position_gains(
         explanation.rows, explanation.inferred, likely, _allowed_sigmas(so_far), angle
     )
     return gain.of(places), places
+
+
+def _out_of_reach(
+    place: tuple[float, float] | None,
+    refused: Sequence[tuple[float, float]],
+    taken: Collection[tuple[float, float] | None],
+) -> bool:
+    """Whether a joint does not go to where a place is, by those that were left out.
+
+    Two that were left out at the same angle of a joint, at which none was taken, are
+    left out for that angle: one beyond it is not asked for either.
+
+    >>> left_out = [(-45.0, -5.0), (-45.0, -2.5)]
+    >>> [_out_of_reach((a, 0.0), left_out, {(-22.5, 0.0)}) for a in (-45.0, 45.0)]
+    [True, False]
+    """
+    for joint, angle in enumerate(place or ()):
+        for limit in {r[joint] for r in refused}:
+            often = sum(r[joint] == limit for r in refused) > 1
+            beyond = angle * limit > 0 and abs(angle) >= abs(limit)
+            if often and beyond and not any(t and t[joint] == limit for t in taken):
+                return True
+    return False
 
 
 def _allowed_sigmas(so_far: InterimResult) -> dict[str, float]:

@@ -417,3 +417,25 @@ def test_only_a_plan_that_finds_its_positions_says_how_many_there_are_at_most() 
         {"run": {**ADAPTIVE, "most": 6}}, "the test"
     ).about
     assert procedures.max_positions(more, "adaptive") == 6
+
+
+@pytest.mark.parametrize(
+    ("place", "refused", "taken", "out"),
+    [
+        ((-45.0, 0.0), [(-45.0, 5.0)], [], False),  # of one, nobody knows which joint
+        ((-45.0, 0.0), [(-45.0, 5.0), (-45.0, 2.5)], [], True),
+        ((-60.0, 0.0), [(-45.0, 5.0), (-45.0, 2.5)], [], True),  # beyond it
+        ((-22.5, 0.0), [(-45.0, 5.0), (-45.0, 2.5)], [], False),
+        ((45.0, 0.0), [(-45.0, 5.0), (-45.0, 2.5)], [], False),  # to the other side
+        ((-45.0, 0.0), [(-45.0, 5.0), (-45.0, 2.5)], [(-45.0, -5.0)], False),
+        ((22.5, 5.0), [(-45.0, 5.0), (45.0, 5.0)], [(0.0, 0.0)], True),  # in beta
+        ((22.5, 0.0), [(-45.0, 0.0), (45.0, 0.0)], [], False),  # 0 is always reached
+    ],
+)
+def test_an_angle_that_a_joint_does_not_reach_is_asked_for_twice_at_most(
+    place: tuple[float, float],
+    refused: list[tuple[float, float]],
+    taken: list[tuple[float, float]],
+    out: bool,
+) -> None:
+    assert adaptive._out_of_reach(place, refused, taken) is out

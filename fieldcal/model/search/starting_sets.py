@@ -13,6 +13,7 @@ import numpy as np
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import GYR
 from fieldcal.model import priors
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
@@ -31,9 +32,7 @@ def starting_sets(fit: GaussNewton, search: Search, best: Set) -> Iterator[Set]:
 
     The rows of turns are those of the fit when each set is asked for.
     """
-    for large in (_set_with_large_angle(search), _set_with_large_turn(search)):
-        if large is not None:
-            yield large
+    yield from sets_with_large_turns(search)
     if elsewhere := _positions_elsewhere(fit):
         yield search.sets.evaluate(elsewhere)
     usual = tuple((c, c.variants[0]) for c in fit.dictionary.causes if c.usual)
@@ -55,42 +54,35 @@ def visible_angle(gram: Gram) -> float:
     return float(np.sqrt(2 * sigma / G0))
 
 
-def _set_with_large_angle(search: Search) -> Set | None:
-    """Set of one position with a large angle error, if there seems to be one.
+def sets_with_large_turns(search: Search) -> Iterator[Set]:
+    """Sets of one position, or of one effect, that turns by a large angle.
 
     A large angle is not linear: about the stated angle its residuals make it less
-    likely than causes with more columns. It is large if its square shows.
+    likely than causes with more columns, such as a bias that jumps and whatever makes
+    up for the length of the force. It is large if its square shows.
     """
-    sets = search.sets
+    sets, tried = search.sets, set[str]()
     empty = sets.evaluate(())
     for offer in search.offers.ranked(empty):
-        cause, group = offer.member
-        if cause.kind != "position":
+        kind = _kind_of_turn(*offer.member)
+        if not kind or kind in tried:
             continue
-        moved = search.offers.accept(empty, offer)
-        angles = estimates_by_column(moved.state, sets.dictionary)[group.columns]
-        return moved if np.abs(angles).max() >= visible_angle(sets.gram) else None
-    return None
-
-
-def _set_with_large_turn(search: Search) -> Set | None:
-    """Set of one effect that turns the device at an instant, if by a large angle.
-
-    A base that is knocked by a degree is less likely about the base as it stood than a
-    bias that jumps, and whatever else makes up for the length of the force.
-    """
-    sets = search.sets
-    empty = sets.evaluate(())
-    for offer in search.offers.ranked(empty):
-        _, group = offer.member
-        effect = group.effect
-        if not (isinstance(effect, Sensor) and effect.nonlinear):
-            continue
+        tried.add(kind)
         turned = search.offers.accept(empty, offer)
-        values = estimates_by_column(turned.state, sets.dictionary)[group.columns]
-        size = np.linalg.norm(np.deg2rad(values))
-        return turned if size >= visible_angle(sets.gram) else None
-    return None
+        values = estimates_by_column(turned.state, sets.dictionary)
+        angles = values[offer.member[1].columns]
+        if kind == "effect":
+            angles = np.deg2rad(angles)
+        if np.abs(angles).max() >= visible_angle(sets.gram):
+            yield turned
+
+
+def _kind_of_turn(cause: Cause, group: Group) -> str:
+    """Whether a cause is a turn, in rad of a position or in degrees of an effect."""
+    if cause.kind == "position":
+        return "position"
+    effect = group.effect
+    return "effect" if isinstance(effect, Sensor) and effect.nonlinear else ""
 
 
 def _positions_elsewhere(fit: GaussNewton) -> tuple[Member, ...]:

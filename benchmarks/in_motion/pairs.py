@@ -42,8 +42,10 @@ class Drawn:
     truth: dict[tuple[str, str], float]
 
 
-def drawn(number: int, seed: int, lag: float = 0.0, jitter: float = 0.0) -> Drawn:
-    """Draw the device with a number.
+def drawn(
+    number: int, seed: int, lag: float = 0.0, jitter: float = 0.0, hz: float = HZ
+) -> Drawn:
+    """Draw the device with a number, of samples at `hz`.
 
     `lag` is a time constant of the gyroscopes, s, and `jitter` by how much its samples'
     stamps are off, s, one sigma.
@@ -78,7 +80,7 @@ def drawn(number: int, seed: int, lag: float = 0.0, jitter: float = 0.0) -> Draw
         for j, axis in enumerate("xyz")
     }
     if kind:
-        values, names = _effect(kind, device, rng)
+        values, names = _effect(kind, device, rng, hz)
         truth |= {(kind, n): float(v) for n, v in zip(names, values, strict=True)}
     if lag and kind != "bandwidth":
         truth["bandwidth", "gyr"] = lag
@@ -86,7 +88,7 @@ def drawn(number: int, seed: int, lag: float = 0.0, jitter: float = 0.0) -> Draw
 
 
 def _effect(
-    kind: str, device: dict[str, Any], rng: np.random.Generator
+    kind: str, device: dict[str, Any], rng: np.random.Generator, hz: float
 ) -> tuple[Array, list[str]]:
     """Give a device an effect; its values, and what they are called."""
     if kind == "g_sensitivity":
@@ -107,7 +109,7 @@ def _effect(
         device["second"] = tuple(taus.tolist())
         return taus, ["acc", "gyr"]
     if kind == "stamp_error":
-        device["jitter"] = float(rng.uniform(0.002, 0.006))
+        device["jitter"] = float(rng.uniform(0.05, 0.15)) / hz
         return np.ones(1), ["share"]
     if kind == "increments":
         device["interval"] = float(rng.uniform(0.003, 0.01))
@@ -141,7 +143,7 @@ def compared(
     What was drawn, what was found, and the processor time that it took, s.
 
     """
-    one, drive = drawn(number, seed, lag, jitter), Drive(seed + number)
+    one, drive = drawn(number, seed, lag, jitter, hz), Drive(seed + number)
     real = block_of(recorded(drive, one.device, seconds, hz))
     sim = block_of(recorded(drive, {}, seconds + 20, hz))
     start = time.process_time()

@@ -25,28 +25,21 @@ array([[[ 0.    ,  0.    ],
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.effects.bias_step import BiasStep
-from fieldcal.physics.effect import NO_SHAPE, Param, Separable
+from fieldcal.physics.attitude_step import AttitudeStep, at_rest_in_known_position
+from fieldcal.physics.effect import Param
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.shape import Shape
-from fieldcal.physics.turned_outputs import change_by_turn
 
 
-class BaseStep(Separable):
+class BaseStep(AttitudeStep):
     """Jump of the tilt of the base."""
 
     params = (Param("about_x_deg", "deg", 0.3), Param("about_z_deg", "deg", 0.3))
-    shapes = (Shape("at_s", "s", -np.inf, np.inf, "instant"),)
-    nonlinear = True
     turns_device = True
     covariate = "time, along what a tilt of the base does in each position"
-    seen_in = "time"
     decided_by = "a position from before the knock once more"
     cure = (
         "Fix the base, and repeat the positions from before the knock: tilt and "
@@ -54,21 +47,13 @@ class BaseStep(Separable):
     )
     source = "a table that is pushed, a tripod that is kicked; 0.02 to 1 deg"
 
-    def applies(self, x: Experience) -> bool:
-        """Where the angles of more than one position are known."""
-        return len(np.unique(x.position[_at_rest_in_known_position(x)])) > 1
-
     def chance(self, x: Experience) -> float:
         """Of three hundred sessions one has a knock that nobody noticed."""
         return 3e-3
 
-    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """Step function: 0 before the instant, 1 after it."""
-        return BiasStep().course(x, shape)
-
-    def _axes(self, x: Experience) -> Array:
-        """Axes of the step in those of the device, (n, 3, 2); zero where it is none."""
-        known = _at_rest_in_known_position(x)
+    def axes(self, x: Experience) -> Array:
+        """Level axes of the base; where no angles are known, two across the force."""
+        known = at_rest_in_known_position(x)
         rows = np.flatnonzero(known | _at_rest_in_free_position(x))
         out = np.zeros((len(x), 3, 2))
         if len(rows):
@@ -79,31 +64,9 @@ class BaseStep(Separable):
             )
         return out
 
-    def pattern(self, x: Experience) -> Array:
-        """Change of the outputs at rest for a degree about each axis, (n, 6, 2).
-
-        Where the angles are not known, the axes are any two across the force.
-        """
-        axes = self._axes(x)
-        # what a rate table adds is tilted with the base
-        rate = np.where(x.rate.any(axis=1, keepdims=True), 0.0, x.w)
-        turned = [-np.cross(axes, v[:, :, None], axis=1) for v in (x.f, rate)]
-        out: Array = np.deg2rad(1.0) * np.concatenate(turned, axis=1)
-        return out
-
-    def change_of_outputs(
-        self, x: Experience, values: Array, shape: Mapping[str, float] = NO_SHAPE
-    ) -> Array:
-        """Change by the whole rotation: of one degree, 0.15 mg are of second order."""
-        turn = np.einsum("nik,k->ni", self._axes(x), np.deg2rad(values))
-        rate = np.where(x.rate.any(axis=1, keepdims=True), 0.0, x.w)
-        return change_by_turn(x.f, rate, turn) * self.course(x, shape)[:, None]
-
-
-def _at_rest_in_known_position(x: Experience) -> NDArray[np.bool_]:
-    """Rows at rest in a known position."""
-    held: NDArray[np.bool_] = x.oriented & (x.position >= 0)
-    return held
+    def rate(self, x: Experience) -> Array:
+        """The Earth's rate; what a rate table adds is tilted with the base."""
+        return np.where(x.rate.any(axis=1, keepdims=True), 0.0, x.w)
 
 
 def _at_rest_in_free_position(x: Experience) -> NDArray[np.bool_]:

@@ -21,6 +21,7 @@ from fieldcal.core.samples import Array
 from fieldcal.physics.effect import NO_SHAPE, BiasChange, six
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
+from fieldcal.physics.step import step_course
 
 
 class BiasStep(BiasChange):
@@ -40,7 +41,4 @@ class BiasStep(BiasChange):
 
     def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """One from the instant on, on every output."""
-        after = x.t - shape["at_s"]
-        part = after / np.where(x.lasts > 0, x.lasts, 1.0) + 0.5
-        out: Array = np.where(x.lasts > 0, np.clip(part, 0.0, 1.0), after >= 0)
-        return out
+        return step_course(x, shape["at_s"])

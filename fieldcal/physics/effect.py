@@ -162,13 +162,6 @@ class Sensor(Effect):
 
     kind = "sensor"
 
-    nonlinear: ClassVar[bool] = False
-    """Whether `change_of_outputs` is more than the design times the parameters."""
-
-    turns_device: ClassVar[bool] = False
-    """Whether it turns the device itself, so that gyroscopes on a later turn begin from
-    where the force then points."""
-
     @abstractmethod
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Differentiate the six outputs by the parameters, (n, 6, k).

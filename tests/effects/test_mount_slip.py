@@ -15,6 +15,7 @@ from fieldcal.cli import main
 from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
+from fieldcal.physics.attitude_step import AttitudeStep
 from fieldcal.physics.effect import Sensor
 from fieldcal.physics.experience import Experience
 from fieldcal.sim_device.vocabulary import checked_effect
@@ -62,7 +63,7 @@ def test_a_calibration_of_a_device_that_slips_is_right(
 def test_a_large_turn_is_a_whole_rotation(name: str) -> None:
     """To the square of the angle, which the design leaves out."""
     rng, effect = np.random.default_rng(5), catalogue()[name]
-    assert isinstance(effect, Sensor) and effect.nonlinear
+    assert isinstance(effect, AttitudeStep)
     alpha, beta = rng.uniform(-1.5, 1.5, (2, 6))
     x = Experience.at_rest(alpha, beta, 9.81, lasts=np.ones(6))
     values = np.array([3.0, -2.0, 4.0])[: len(effect.params)]

@@ -21,7 +21,7 @@ from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.turn_rows import TurnRows
-from fieldcal.physics.effect import Sensor
+from fieldcal.physics.attitude_step import AttitudeStep
 
 LARGE_INSTABILITY = 4.0
 """Instability, in typical ones, above which causes may hide that show only together."""
@@ -81,8 +81,7 @@ def _kind_of_turn(cause: Cause, group: Group) -> str:
     """Whether a cause is a turn, in rad of a position or in degrees of an effect."""
     if cause.kind == "position":
         return "position"
-    effect = group.effect
-    return "effect" if isinstance(effect, Sensor) and effect.nonlinear else ""
+    return "effect" if isinstance(group.effect, AttitudeStep) else ""
 
 
 def _positions_elsewhere(fit: GaussNewton) -> tuple[Member, ...]:

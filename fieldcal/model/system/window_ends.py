@@ -17,7 +17,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.system.linear_rows import LinearRows
-from fieldcal.physics.effect import Sensor
+from fieldcal.physics.attitude_step import AttitudeStep
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,6 @@ def _columns_that_turn_the_device(d: Dictionary) -> Index:
         group.columns
         for cause in d.causes
         for group in cause.variants
-        if isinstance(group.effect, Sensor) and group.effect.turns_device
+        if isinstance(group.effect, AttitudeStep) and group.effect.turns_device
     ]
     return np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *found]))

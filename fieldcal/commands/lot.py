@@ -62,13 +62,13 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.calibration import limits
     from fieldcal.core.errors import InputError
     from fieldcal.fleet.lot import analyse_lot
-    from fieldcal.history import sessions
+    from fieldcal.history import filters, sessions
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
 
     if not 0 < args.fdr < 1:
         raise InputError(f"--fdr {args.fdr:g}: give a share between 0 and 1")
-    wanted = sessions.parse_filters(args.query)
+    wanted = filters.parse_filters(args.query)
     database = Database(args.history or default_location())
     some = database.run(lambda db: sessions.find_sessions(db, wanted, once=True))
     if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
@@ -94,13 +94,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _why_none(database: Database, wanted: Mapping[str, str]) -> str:
     """Why no session of the store meets all conditions, and what there is."""
-    from fieldcal.history import sessions
+    from fieldcal.history import filters, sessions
 
     since, until = wanted.get("since"), wanted.get("until")
     if since and until and since > until and not since.startswith(until):
         return f"since={since} is later than until={until}: exchange the two"
     for name, value in wanted.items():
-        if name in sessions.TIMES:
+        if name in filters.TIMES:
             continue
         known = database.run(lambda db, n=name: sessions.names_in_store(db, n))  # type: ignore[misc]
         if value not in known:

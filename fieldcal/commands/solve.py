@@ -172,12 +172,12 @@ def _factory_options(args: argparse.Namespace) -> dict[str, float]:
 def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
     """Prior from the units of the store that --lot selects, without this unit."""
     from fieldcal.fleet.lot_prior import estimate_lot_prior
-    from fieldcal.history import sessions
+    from fieldcal.history import filters, sessions
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
     from fieldcal.session.recorded_part import recorded_part
 
-    wanted = sessions.parse_filters(args.lot)
+    wanted = filters.parse_filters(args.lot)
     database = Database(args.history or default_location())
     some = database.run(
         lambda db: sessions.find_sessions(db, wanted, documents=True, once=True)

@@ -15,8 +15,9 @@ from fieldcal.fleet.outcome import SessionTask, failed_session
 from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
+from fieldcal.history.filters import LEVELS
 from fieldcal.history.repeats import replacing_folders
-from fieldcal.history.sessions import LEVELS, StoredSession
+from fieldcal.history.sessions import StoredSession
 
 CHUNK = 500
 """Number of sessions in a row group of the Parquet file."""

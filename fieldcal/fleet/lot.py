@@ -20,7 +20,8 @@ from fieldcal.fleet.lot_yield import yield_interval
 from fieldcal.fleet.odd import benjamini_hochberg, unit_p_values
 from fieldcal.fleet.shifts import Shift, find_shifts
 from fieldcal.fleet.units import is_unit, latest_session_per_unit, serials_alike
-from fieldcal.history.sessions import LEVELS, StoredSession, parameter_values
+from fieldcal.history.filters import LEVELS
+from fieldcal.history.sessions import StoredSession, parameter_values
 
 MIN_UNITS = 5
 """Smallest number of units for which a spread is estimated."""
@@ -168,24 +169,7 @@ def analyse_lot(
             f"units with a good result: {len(useful)}, a lot needs {MIN_UNITS}: run"
             " fieldcal batch on more sessions, or ask for fewer conditions"
         )
-    names = dict.fromkeys(n for one in useful for n in one.parameters)
-    found = {}
-    for name in names:
-        x, sigma = parameter_values(useful, name)
-        known = np.isfinite(x) & (sigma > 0)
-        if known.sum() >= MIN_UNITS:
-            found[name] = (np.flatnonzero(known), x[known], sigma[known])
-    parameters = {
-        name: lot_parameter(
-            name,
-            useful[told[0][0]].parameters[name][2],
-            *told,
-            limits,
-            len(found),
-            sum(useful[i].taken_at is None for i in told[0].tolist()),
-        )
-        for name, told in found.items()
-    }
+    parameters = _lot_parameters(useful, limits)
     levels = [
         g
         for g in groupings(_stated_levels(useful), LEVELS)
@@ -206,6 +190,30 @@ def analyse_lot(
         tuple(s for p in parameters.values() for s in _find_shifts(p, levels)),
         tuple(a for p in parameters.values() for a in _find_alarms(p, useful)),
     )
+
+
+def _lot_parameters(
+    useful: Sequence[StoredSession], limits: GradeLimits
+) -> dict[str, LotParameter]:
+    """Each parameter that enough units have."""
+    names = dict.fromkeys(n for one in useful for n in one.parameters)
+    found = {}
+    for name in names:
+        x, sigma = parameter_values(useful, name)
+        known = np.isfinite(x) & (sigma > 0)
+        if known.sum() >= MIN_UNITS:
+            found[name] = (np.flatnonzero(known), x[known], sigma[known])
+    return {
+        name: lot_parameter(
+            name,
+            useful[told[0][0]].parameters[name][2],
+            *told,
+            limits,
+            len(found),
+            sum(useful[i].taken_at is None for i in told[0].tolist()),
+        )
+        for name, told in found.items()
+    }
 
 
 def serials_sentence(found: LotAnalysis) -> str:

@@ -24,7 +24,8 @@ from fieldcal.fleet.levels import (
     groupings,
 )
 from fieldcal.fleet.reduced import ReducedSession, SharedColumn
-from fieldcal.history.sessions import LEVELS, StoredSession
+from fieldcal.history.filters import LEVELS
+from fieldcal.history.sessions import StoredSession
 from fieldcal.model import priors, thresholds
 
 FOLLOWED = 4

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,31 +16,17 @@ from sqlalchemy import (
     delete,
     func,
     insert,
-    or_,
     select,
     update,
 )
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.errors import InputError
 from fieldcal.core.file_names import storable_text
 from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.core.samples import Array
+from fieldcal.history.filters import LEVELS, TIMES, condition
 from fieldcal.history.repeats import part_of_row, supersede
 from fieldcal.history.tables import PARAMETER, REDUCED_ROWS, SESSION
-
-LEVELS = ("model", "lot", "station", "operator")
-"""Properties that sessions of several devices may share, from session.toml."""
-
-FILTERS = ("serial", *LEVELS, "since", "until")
-"""Names of the conditions for finding sessions."""
-
-
-TIMES = ("since", "until")
-"""Those of them that are dates."""
-
-DATE = re.compile(r"(\d{4})(?:-(\d{1,2}))?(?:-(\d{1,2}))?")
-"""A date, a month or a year."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,49 +178,6 @@ def fingerprints(db: Connection) -> dict[str, str]:
     return {folder: mark for folder, mark in rows if mark is not None}
 
 
-def parse_filters(words: Iterable[str]) -> dict[str, str]:
-    """Parse conditions such as ``lot=7``.
-
-    Raises
-    ------
-    InputError
-        If a word is no condition or repeats one, or has no date where one belongs.
-
-    """
-    found = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        if not equals or name not in FILTERS:
-            raise InputError(
-                f"{word}: is no condition; write one of {', '.join(FILTERS)} and a"
-                " value, as in lot=7 or since=2026-03-01"
-            )
-        if name in found:
-            raise InputError(
-                f"{word}: {name} is given twice; a session has one, so ask for one at a"
-                " time"
-            )
-        found[name] = _parse_date(word, value) if name in TIMES else value.strip()
-    return found
-
-
-def _parse_date(word: str, value: str) -> str:
-    """Text of a date, month, year or time, which compares with `taken_at` as text."""
-    parts = DATE.fullmatch(value)
-    try:
-        if parts is None:
-            at = datetime.fromisoformat(value)
-            at = at if at.tzinfo else at.replace(tzinfo=UTC)
-            return at.astimezone(UTC).isoformat(timespec="seconds")
-        numbers = [int(part) for part in parts.groups() if part]
-        date(*[*numbers, 1, 1][:3])
-    except ValueError as error:
-        raise InputError(
-            f"{word}: is no date ({error}); write it as in since=2026-03-01"
-        ) from error
-    return "-".join(f"{number:02d}" for number in numbers)
-
-
 def find_sessions(
     db: Connection,
     wanted: Mapping[str, str] | None = None,
@@ -250,14 +191,14 @@ def find_sessions(
     Parameters
     ----------
     db : the store
-    wanted : conditions by the names in `FILTERS`; `since` and `until` are dates
+    wanted : conditions by the names in `filters.FILTERS`; `since` and `until` are dates
     folders : only sessions in these folders, if given
     documents : whether to load result and diagnosis
     reduced : whether to load reduced rows
     once : whether to leave out sessions that another one with the same samples replaces
 
     """
-    some = [_condition(name, value) for name, value in (wanted or {}).items()]
+    some = [condition(name, value) for name, value in (wanted or {}).items()]
     if folders is not None:
         some.append(SESSION.c.folder.in_([*map(storable_text, folders)]))
     if once:
@@ -284,21 +225,13 @@ def names_in_store(db: Connection, level: str) -> list[str]:
 
 def untimed_sentence(db: Connection, wanted: Mapping[str, str]) -> str:
     """Sentence about sessions of unknown time that `since` and `until` leave out."""
-    others = [_condition(n, value) for n, value in wanted.items() if n not in TIMES]
+    others = [condition(n, value) for n, value in wanted.items() if n not in TIMES]
     if len(others) == len(wanted):
         return ""
     others.append(~SESSION.c.superseded)
     query = select(func.count()).where(SESSION.c.taken_at.is_(None), *others)
     count = db.execute(query).scalar_one()
     return f"sessions of unknown time that are left out: {count}" if count else ""
-
-
-def _condition(name: str, value: str) -> Any:
-    if name == "since":
-        return SESSION.c.taken_at >= value
-    if name == "until":
-        return or_(SESSION.c.taken_at < value, SESSION.c.taken_at.startswith(value))
-    return SESSION.c[name] == value
 
 
 def _parameters(

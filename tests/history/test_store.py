@@ -27,7 +27,7 @@ from sqlalchemy import inspect, text, update
 from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
 from fieldcal.core.recorded_part import RecordedPart
-from fieldcal.history import database, sessions
+from fieldcal.history import database, filters, sessions
 from fieldcal.history.database import Database
 from fieldcal.history.location import StoreLocation
 from fieldcal.history.repeats import withdraw
@@ -336,13 +336,13 @@ def test_a_full_disk_leaves_what_was_there_and_nothing_half(tmp_path: Path) -> N
 
 
 def test_a_word_that_is_no_condition_is_refused() -> None:
-    assert sessions.parse_filters(["lot=7", "since=2026"]) == {
+    assert filters.parse_filters(["lot=7", "since=2026"]) == {
         "lot": "7",
         "since": "2026",
     }
     for wrong in ("lot", "colour=red"):
         with pytest.raises(InputError, match="is no condition"):
-            sessions.parse_filters([wrong])
+            filters.parse_filters([wrong])
 
 
 @pytest.mark.parametrize(
@@ -366,7 +366,7 @@ def test_dates_are_dates_however_they_are_written(
         stored(i, taken_at=f"{day}T12:00:00+00:00") for i, day in enumerate(days, 1)
     ]
     put(tmp_path / "h", *some, stored(4))
-    wanted = sessions.parse_filters([word])
+    wanted = filters.parse_filters([word])
     assert [int(s.folder[3:]) for s in everything(tmp_path / "h", **wanted)] == found
     data = Database(tmp_path / "h")
     said = data.run(lambda db: sessions.untimed_sentence(db, wanted))
@@ -377,7 +377,7 @@ def test_dates_are_dates_however_they_are_written(
 @pytest.mark.parametrize("value", ["November", "", "30.9.2026", "2026-13-01", "1-2-3"])
 def test_what_is_no_date_is_said_to_be_none(value: str) -> None:
     with pytest.raises(InputError, match=f"since={value}: is no date .*write it as"):
-        sessions.parse_filters([f"since={value}"])
+        filters.parse_filters([f"since={value}"])
 
 
 def test_an_address_that_is_none_is_said_without_its_password() -> None:

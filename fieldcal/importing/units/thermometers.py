@@ -39,7 +39,7 @@ def is_usual_temperature(celsius: float) -> bool:
     return USUAL[0] <= celsius <= USUAL[1]
 
 
-class Thermometer(NamedTuple):
+class ThermometerScale(NamedTuple):
     """Counts of a sensor's thermometer.
 
     Attributes
@@ -56,21 +56,21 @@ class Thermometer(NamedTuple):
 
 
 THERMOMETERS = (
-    Thermometer(256.0, 25.0, "LSM6DSL, LSM6DSO, ISM330"),
-    Thermometer(340.0, 36.53, "MPU-6000, MPU-6050"),
-    Thermometer(333.87, 21.0, "MPU-9250, ICM-20948"),
-    Thermometer(132.48, 25.0, "ICM-42688"),
-    Thermometer(512.0, 23.0, "BMI160, BMI270"),
+    ThermometerScale(256.0, 25.0, "LSM6DSL, LSM6DSO, ISM330"),
+    ThermometerScale(340.0, 36.53, "MPU-6000, MPU-6050"),
+    ThermometerScale(333.87, 21.0, "MPU-9250, ICM-20948"),
+    ThermometerScale(132.48, 25.0, "ICM-42688"),
+    ThermometerScale(512.0, 23.0, "BMI160, BMI270"),
 )
 """Those of the usual sensors, by their data sheets."""
 
 ANALOG_THERMOMETERS = (
-    Thermometer(10.0, 0.0, "ADIS1647x, ADIS1650x"),
-    Thermometer(1 / 0.00565, 25.0, "ADIS1648x"),
-    Thermometer(1 / 0.0125, 25.0, "ADIS16495, ADIS16497"),
-    Thermometer(1 / 0.014285, 25.0, "ADIS16490"),
-    Thermometer(1 / 0.07386, 31.0, "ADIS16448"),
-    Thermometer(1 / 0.14, 25.0, "ADIS1640x"),
+    ThermometerScale(10.0, 0.0, "ADIS1647x, ADIS1650x"),
+    ThermometerScale(1 / 0.00565, 25.0, "ADIS1648x"),
+    ThermometerScale(1 / 0.0125, 25.0, "ADIS16495, ADIS16497"),
+    ThermometerScale(1 / 0.014285, 25.0, "ADIS16490"),
+    ThermometerScale(1 / 0.07386, 31.0, "ADIS16448"),
+    ThermometerScale(1 / 0.14, 25.0, "ADIS1640x"),
 )
 """Likewise of the sensors of Analog Devices."""
 
@@ -78,7 +78,7 @@ ANALOG_THERMOMETERS = (
 def temperature_counts(
     low: float,
     high: float,
-    thermometers: Sequence[Thermometer] = THERMOMETERS,
+    thermometers: Sequence[ThermometerScale] = THERMOMETERS,
 ) -> list[str]:
     """Options that make deg C of counts from `low` to `high`, as the usual sensors do.
 

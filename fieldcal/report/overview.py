@@ -70,11 +70,11 @@ def _verdict(
     if found is None:
         return "not solved", "warn", "fieldcal solve has not been run yet."
     decision = table_at(found.info, "decision")
-    reasons = " ".join(str(r) for r in list_at(decision, "reasons"))
+    reasons = "; ".join(str(r).rstrip(".") for r in list_at(decision, "reasons"))
     if decision.get("go") is False:
         remedy = str(table_at(decision, "remedy").get("says", ""))
         do = f"{remedy[:1].upper()}{remedy[1:]}." if remedy else "Do not apply it."
-        return "no-go", "bad", f"{do} {reasons or 'A limit is not kept.'}"
+        return "no-go", "bad", f"{do} {reasons or 'A limit is not kept'}."
     if not found.good:
         return "bad", "bad", "Do not use these numbers."
     says = "Apply it: the numbers hold within their ±."

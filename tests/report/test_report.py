@@ -254,15 +254,19 @@ def test_a_decision_by_limits_stands_on_top(bench: Path, tmp_path: Path) -> None
         {"name": "acc_bias", "ok": False, "says": "0.3 m/s^2 of 0.2"},
         {"name": "history", "ok": None, "says": "the first of this device"},
     ]
-    result["decision"] = {"go": False, "reasons": ["Too much bias."], "checks": checks}
+    result["decision"] = {
+        "go": False,
+        "reasons": ["Too much bias.", "few"],
+        "checks": checks,
+    }
     (session / "result.json").write_text(json.dumps(result))
     text = Tags(render(gather(session))).text
-    assert "no-go" in text and "Too much bias." in text
+    assert "no-go" in text and "Too much bias; few." in text
     assert "not kept" in text and "not checked" in text
     result["decision"]["remedy"] = {"says": "take position 3 again: it disagrees"}
     (session / "result.json").write_text(json.dumps(result))
     text = Tags(render(gather(session))).text
-    assert "Take position 3 again: it disagrees. Too much bias." in text
+    assert "Take position 3 again: it disagrees. Too much bias; few." in text
 
 
 def test_the_page_opens_with_what_to_do(material: ReportMaterial) -> None:

@@ -56,6 +56,7 @@ class MotionFit:
     Attributes
     ----------
     levels : ln of the noise's power in each band, by channel
+    state, values : at the estimate that was settled last, and (k,) of its columns
 
     """
 
@@ -64,6 +65,8 @@ class MotionFit:
     ) -> None:
         self.system, self.nominal, self.bands, self.hz = system, nominal, bands, hz
         self.levels: dict[int, Array] = {}
+        self.state = nominal
+        self.values: Array = np.zeros(system.dictionary.width)
         self._finest = FINEST**2 * np.mean(np.nan_to_num(system.motion.y) ** 2, axis=0)
 
     @property
@@ -89,29 +92,34 @@ class MotionFit:
         return type(self)(system, self.nominal, self.bands, self.hz)
 
     def evidence(self, members: tuple[Member, ...]) -> float:
-        """Ln evidence of causes after `settle`, including that of the noise."""
+        """Ln evidence of causes after `settle`, including that of the noise.
+
+        `members` are those that were settled, or more.
+        """
         fit = GaussNewton(self.system, self.nominal)
         members = fit.dictionary.match_members(members)
-        *_, found = fit.settle(self.nominal, np.zeros(fit.dictionary.width), members)
+        *_, found = fit.settle(self.state, self.values, members)
         frequency, power = self.rows.frequency, self.system.power
         told = [np.log(power[frequency <= self.hz[c], c]).sum() for c in self.levels]
         return found.score - 0.5 * float(sum(told))
 
     def settle(self, members: tuple[Member, ...]) -> None:
         """Fit some causes, the alignment and the noise in turn until convergence."""
+        fit = GaussNewton(self.system, self.nominal)
+        members = fit.dictionary.match_members(members)
+        state, sizes = self.nominal, None
+        values: Array = np.zeros(fit.dictionary.width)
         for _ in range(SETTLED):
-            fit = GaussNewton(self.system, self.nominal)
-            members = fit.dictionary.match_members(members)
-            none: Array = np.zeros(fit.dictionary.width)
-            state, values, found = fit.settle(self.nominal, none, members)
-            wanted = fit.wanted_columns(members) | (values != 0)
-            linear = self.system.linearised(state, wanted)
-            rows, power = self.rows, self.system.power.copy()
+            rows, power, before = self.rows, self.system.power.copy(), values
+            found, linear = fit.estimate(state, values, members, sizes)
             self._weigh(linear, values, found)
+            (state, values), sizes = fit.state_at_estimate(found), found.sizes
             self._align(found, state)
             change = np.abs(np.log(self.system.power / power)).max()
-            if self._step(found, rows) < STAYS and change < STEADY:
+            step = max(self._step(found, rows), fit.largest_step(found, before, values))
+            if step < STAYS and change < STEADY:
                 break
+        self.state, self.values = state, values
 
     def _weigh(self, linear: Sequence[LinearRows], values: Array, found: Set) -> None:
         """Set the noise of the rows to that of a fit's residuals."""

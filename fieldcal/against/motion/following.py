@@ -165,16 +165,19 @@ def _without_idle_lags(
     Linearised about a filter, its absence looks worse than it is, since its effect is
     proportional to the square or cube of its time constant.
     """
+    most: float | None = None
     for member in [m for m in found.best.members if lag_of(m) != Lag()]:
-        members = found.best.members
         if member[0].key not in found.best.keys:
             continue
-        others = tuple(m for m in members if m[0].key != member[0].key)
-        full, lean = fit.copy(), fit.copy()
-        full.settle(members)
+        if most is None:
+            full = fit.copy()
+            full.settle(found.best.members)
+            most = full.evidence(found.best.members)
+        others = tuple(m for m in found.best.members if m[0].key != member[0].key)
+        lean = fit.copy()
         lean.settle(others)
-        if lean.evidence(others) >= full.evidence(members):
-            fit, found = lean, lean.search(others)
+        if lean.evidence(others) >= most:
+            fit, found, most = lean, lean.search(others), None
     return fit, found
 
 

@@ -29,78 +29,82 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 from scipy.signal import lfilter
 
 from fieldcal.core.samples import Array
+from fieldcal.model.rows.knots import RESTART_INTERVALS, even_times, hermite_spline
 
 ROOT2 = np.sqrt(2)
-
-RESTART_INTERVALS = 3.5
-"""Intervals between knots from which the input is taken up anew, at rest."""
 
 QUADRATURE_NODES, FORGOTTEN_EXPONENT = 48, 40.0
 """Of the integral of a cubic from one instant to the next, times the exponential, and
 the exponent from which on that has nothing left."""
 
 
-def first_order(spline: CubicSpline, tau: float) -> CubicSpline:
+def first_order(spline: PPoly, tau: float) -> PPoly:
     """A spline of k channels after low-pass (1), or after its inverse."""
-    even = _even_knots(spline)
-    t, u = even.x, even(even.x)
+    t, u, change = _even_knots(spline)
     if tau < 0:
-        return CubicSpline(t, u - tau * even(t, 1))  # (3)
-    return CubicSpline(t, _filter_state(even, u, -1 / tau) / tau)  # (4)
+        return CubicSpline(t, u - tau * change)  # (3)
+    y = _filter_state(t, u, change, -1 / tau) / tau  # (4)
+    return hermite_spline(t, y, (u - y) / tau)  # (1)
 
 
-def second_order(spline: CubicSpline, tau: float) -> CubicSpline:
+def second_order(spline: PPoly, tau: float) -> PPoly:
     """A spline of k channels after low-pass (2), or after its inverse."""
-    even = _even_knots(spline)
-    t, u = even.x, even(even.x)
+    t, u, change = _even_knots(spline)
     if tau < 0:
-        change = even(t, 1)  # right to h^4 at the knots, its own bend only to h^2
+        # right to h^4 at the knots, the spline's own bend only to h^2
         bend = CubicSpline(t, change)(t, 1)
         return CubicSpline(t, u - ROOT2 * tau * change + tau**2 * bend)  # (3)
-    pole = (-1 + 1j) / (ROOT2 * tau)
-    return CubicSpline(t, ROOT2 / tau * _filter_state(even, u, pole).imag)  # (4)
+    return hermite_spline(t, *_butterworth(t, u, change, tau))
 
 
-def first_order_slope(spline: CubicSpline, tau: float) -> CubicSpline:
+def first_order_slope(spline: PPoly, tau: float) -> PPoly:
     """Decrease of an output per second of tau, (5)."""
-    even, tau = _even_knots(spline), abs(tau)
-    t, y = even.x, even(even.x)
-    return CubicSpline(t, (y - _filter_state(even, y, -1 / tau) / tau) / tau)
+    t, y, change = _even_knots(spline)
+    tau = abs(tau)
+    slower = _filter_state(t, y, change, -1 / tau) / tau
+    less = (y - slower) / tau  # (5)
+    return hermite_spline(t, less, (change - less) / tau)
 
 
-def second_order_slope(spline: CubicSpline, tau: float) -> CubicSpline:
+def second_order_slope(spline: PPoly, tau: float) -> PPoly:
     """The same of a low-pass of second order, (6); tau is not 0."""
-    even, tau = _even_knots(spline), abs(tau)
-    t, y, pole = even.x, even(even.x), (-1 + 1j) / (ROOT2 * tau)
-    z = _filter_state(even, y, pole)
-    slower, change = ROOT2 / tau * z.imag, ROOT2 / tau * (pole * z).imag
-    return CubicSpline(t, 2 * (y - slower) / tau - ROOT2 * change)
+    t, y, change = _even_knots(spline)
+    tau = abs(tau)
+    slower, drift = _butterworth(t, y, change, tau)
+    less = 2 * (y - slower) / tau - ROOT2 * drift  # (6)
+    bend = ((y - slower) / tau - ROOT2 * drift) / tau  # (2)
+    return hermite_spline(t, less, 2 * (change - drift) / tau - ROOT2 * bend)
 
 
-def _even_knots(spline: CubicSpline) -> CubicSpline:
-    """The spline with evenly spaced knots, except for pauses."""
+def _butterworth(t: Array, u: Array, change: Array, tau: float) -> tuple[Array, Array]:
+    """Output of (2) at even knots, and its derivative, (n, k)."""
+    pole = (-1 + 1j) / (ROOT2 * tau)
+    z = _filter_state(t, u, change, pole)
+    return ROOT2 / tau * z.imag, ROOT2 / tau * (pole * z).imag  # (4)
+
+
+def _even_knots(spline: PPoly) -> tuple[Array, Array, Array]:
+    """Knots, even except for pauses, with the spline's values and derivatives."""
     t = spline.x
     step = float(np.median(np.diff(t)))
     if np.allclose(np.diff(t), step, rtol=1e-6, atol=0.0):
-        return spline
-    breaks = np.flatnonzero(np.diff(t) > RESTART_INTERVALS * step) + 1
-    even = [
-        np.linspace(some[0], some[-1], max(round((some[-1] - some[0]) / step), 1) + 1)
-        for some in np.split(t, breaks)
-        if some[-1] > some[0]
-    ]
-    knots = np.concatenate(even)
-    return CubicSpline(knots, spline(knots))
+        last = t[-1:]
+        return (
+            t,
+            np.concatenate([spline.c[-1], spline(last)]),
+            np.concatenate([spline.c[-2], spline(last, 1)]),
+        )
+    knots = even_times(t, step)
+    values = spline(knots)
+    return knots, values, CubicSpline(knots, values)(knots, 1)
 
 
-def _filter_state(even: CubicSpline, u: Array, pole: complex) -> Any:
+def _filter_state(t: Array, u: Array, change: Array, pole: complex) -> Any:
     """Z of (4) at the knots, (n, k), from rest after every pause."""
-    t = even.x
-    change = even(t, 1)
     out = np.empty(u.shape, dtype=np.result_type(pole, float))
     steps = np.diff(t)
     pauses = np.flatnonzero(steps > RESTART_INTERVALS * np.median(steps)) + 1

@@ -6,9 +6,10 @@ clock. The device experiences at time t of its clock
     v(t) = R u(s),    s = t - delay + drift (t - middle)                           (1)
 
 with R the rotation from the axes of the reference to those of the device. A row is the
-mean of some samples, and of v at the same times. Rows lie in stretches without gaps.
-Since the noise is not white, the rows of each stretch are replaced by their cosine
-coefficients,
+mean of some samples, and of v at the same times; or, where samples are even and the
+reference has several in each row, v of the reference's mean over a row, in the middle.
+Rows lie in stretches without gaps. Since the noise is not white, the rows of each
+stretch are replaced by their cosine coefficients,
 
     c_k = sqrt(2 / n) sum_j y_j cos(pi k (j + 1/2) / n),    c_0 by 1 / sqrt(n)       (2)
 
@@ -39,6 +40,10 @@ TRIADS = (ACC, GYR)
 
 STAMP_ROUNDING = 1e-6
 """Part of the interval of samples by which rounding has stamps be off even times."""
+
+KNOTS_PER_ROW = 4
+"""Knots in each row of the reference's mean over a row, if it has as many samples: what
+is left after that mean is smooth between them."""
 
 RECORDING_PARTS = 8
 """Parts of a recording, of whole stretches, that something may happen to."""
@@ -77,7 +82,8 @@ class MotionRows:
     Attributes
     ----------
     t : (n, m) s, stamps of the samples of each row
-    uneven : (n, m) s, by how much these are off the even times of their stretch
+    at : (n, k) s, where the reference is taken: at all of them, or in the row's middle
+    uneven : (n, k) s, by how much these are off the even times of their stretch
     y : (n, 6) their means, m/s^2 and rad/s; nan where a channel was not measured
     warming, heating : (n,) K and K/s, since the recording's start; nan if no
         thermometer shows a change
@@ -91,6 +97,7 @@ class MotionRows:
     """
 
     t: Array
+    at: Array
     uneven: Array
     y: Array
     warming: Array
@@ -191,11 +198,11 @@ class MotionRows:
     ) -> Array:
         """Means over the rows of a reference as it was, in device axes, (n, 6).
 
-        `weight` (n, m) is what it is multiplied by at each sample.
+        `weight` (n, k) is what it is multiplied by where it is taken.
         """
-        taken = self.t - self.share * self.uneven
+        taken = self.at - self.share * self.uneven
         s = self.alignment.reference_time(taken.ravel() - late)
-        samples = reference.at(s, order).reshape(*self.t.shape, 6)
+        samples = reference.at(s, order).reshape(*taken.shape, 6)
         if weight is not None:
             samples *= weight[:, :, None]
         means = np.einsum("nmc->nc", samples) / samples.shape[1]  # mean() is slower
@@ -272,12 +279,23 @@ def rows_in_motion(
     warming, heating = thermometer.at(block.t[at].mean(axis=1))
     if not thermometer.changes:
         warming = np.full(len(at), np.nan)  # its noise is no change
+    stamps, uneven = block.t[at], _stamp_errors(block.t, stretches).reshape(at.shape)
+    taken = stamps
+    between = step * per_row / KNOTS_PER_ROW
+    if not uneven.any() and reference.step <= between:
+        lasts = step * (1 + alignment.drift)  # by the clock of the reference, (1)
+        reference = reference.averaged_over(lasts * _centred(per_row), between)
+        taken, uneven = stamps.mean(axis=1, keepdims=True), np.zeros((len(at), 1))
     ideal = Response.of(reference)
     return MotionRows(
-        block.t[at], _stamp_errors(block.t, stretches).reshape(at.shape),
-        six[at].mean(axis=1), warming, heating, length,
+        stamps, taken, uneven, six[at].mean(axis=1), warming, heating, length,
         step * per_row, reference, alignment, ideal, ideal,
     )  # fmt: skip
+
+
+def _centred(count: int) -> Array:
+    """Numbers of some samples, from their middle, (count,)."""
+    return np.arange(count) - (count - 1) / 2
 
 
 def _stamp_errors(t: Array, stretches: Sequence[Index]) -> Array:
@@ -288,7 +306,7 @@ def _stamp_errors(t: Array, stretches: Sequence[Index]) -> Array:
     off = [np.empty(0)]
     for stretch in stretches:
         if len(stretch):
-            count = np.arange(len(stretch)) - (len(stretch) - 1) / 2
+            count = _centred(len(stretch))
             stamps = t[stretch] - t[stretch].mean()
             off.append(stamps - count * (count @ stamps) / max(count @ count, 1.0))
     out: Array = np.concatenate(off)

@@ -13,9 +13,10 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from fieldcal.core.samples import Array, Block, Index
+from fieldcal.model.rows.knots import even_times, hermite_spline
 
 GAP_INTERVALS = 3.5
 """Intervals between samples from which there is a gap."""
@@ -46,7 +47,7 @@ class Reference:
         whole = np.isfinite(six[:, self.observed]).any(axis=1)
         self.t, self.step = block.t[whole], float(np.median(np.diff(block.t[whole])))
         self.start, self.end = float(self.t[0]), float(self.t[-1])
-        self.splines = [
+        self.splines: list[tuple[Index, PPoly]] = [
             (channels, CubicSpline(block.t[known], six[np.ix_(known, channels)]))
             for known, channels in self._by_missing_samples(np.isfinite(six))
         ]
@@ -74,11 +75,28 @@ class Reference:
             out[:, channels] = spline(s, order)
         return out
 
-    def filtered_by(self, sensor: Callable[[CubicSpline], CubicSpline]) -> Self:
+    def filtered_by(self, sensor: Callable[[PPoly], PPoly]) -> Self:
         """The reference after a filter is applied to each spline."""
         out = copy(self)
         out.splines = [(channels, sensor(spline)) for channels, spline in self.splines]
         return out
+
+    def averaged_over(self, offsets: Array, step: float) -> Self:
+        """The reference's mean over some samples, at their middle.
+
+        Parameters
+        ----------
+        offsets : (m,) s, of each sample from the middle
+        step : s between the knots of its splines
+
+        """
+
+        def mean(spline: PPoly) -> PPoly:
+            t, m = even_times(spline.x, step), len(offsets)
+            values, change = (sum(spline(t + o, k) for o in offsets) for k in (0, 1))
+            return hermite_spline(t, values / m, change / m)
+
+        return self.filtered_by(mean)
 
     def covers(self, s: Array, margin: float) -> NDArray[np.bool_]:
         """Which instants, s, are inside the reference by a margin and in no gap."""

@@ -109,16 +109,26 @@ class GaussNewton:
         """The state at the estimate of a set, by Gauss and Newton, and that set."""
         state, values = self._near_set_angles(state, self.pad(values), members)
         for _ in range(MAX_NEWTON_STEPS):
-            wanted = self.wanted_columns(members) | (values != 0)
-            linear = self.system.linearised(state, wanted)
-            rows = self.gram_of(linear, values, wanted)
-            settled = Sets(self.dictionary, rows).evaluate(members, sizes)
+            settled, _ = self.estimate(state, values, members, sizes)
             sizes = settled.sizes
             before = values
             state, values = self.state_at_estimate(settled)
             if self.largest_step(settled, before, values) < CONVERGED:
                 break
         return state, values, settled
+
+    def estimate(
+        self,
+        state: State,
+        values: Array,
+        members: tuple[Member, ...],
+        sizes: Sizes | None = None,
+    ) -> tuple[Set, list[LinearRows]]:
+        """A set over the rows linearised about a state, and these rows."""
+        wanted = self.wanted_columns(members) | (values != 0)
+        linear = self.system.linearised(state, wanted)
+        rows = self.gram_of(linear, values, wanted)
+        return Sets(self.dictionary, rows).evaluate(members, sizes), linear
 
     def _near_set_angles(
         self, state: State, values: Array, members: Sequence[Member]

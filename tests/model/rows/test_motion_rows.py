@@ -98,6 +98,32 @@ def test_the_motion_is_that_of_the_reference_where_the_recording_stands() -> Non
     np.testing.assert_allclose(slope, change / (1 + 1e-3), atol=2e-3)
 
 
+@pytest.mark.parametrize(("per_row", "taken"), [(3, 3), (5, 1), (12, 1)])
+def test_rows_of_many_samples_are_means_of_the_motion(per_row: int, taken: int) -> None:
+    turn = Rotation.from_rotvec([0.2, 0.5, -1.0]).as_matrix()
+    there = rows(Alignment(0.3, 1e-3, 12.0, turn), per_row)
+    assert there.t.shape[1] == per_row and there.at.shape[1] == taken
+    s = there.t - 0.3 + 1e-3 * (there.t - 12.0)
+    every = course(s.ravel()).reshape(*s.shape, 6).mean(axis=1)
+    found = there.motion(there.acc)
+    np.testing.assert_allclose(found[:, :3], every[:, :3] @ turn.T, atol=3e-6)
+    np.testing.assert_allclose(found[:, 3:], every[:, 3:] @ turn.T, atol=3e-6)
+    step = 1e-4
+    early, late = (there.motion(replace(there.acc, late=by)) for by in (-step, step))
+    change = (early - late) / (2 * step)
+    slope = there.motion(there.acc, 1)
+    np.testing.assert_allclose(slope, change / (1 + 1e-3), atol=2e-3)
+
+
+def test_uneven_samples_are_each_held_against_the_motion() -> None:
+    even = np.arange(5.0, 30.0, 0.02)
+    t = even + np.random.default_rng(4).normal(0, 2e-3, len(even))
+    block = Block.of(t, course(t)[:, :3], course(t)[:, 3:])
+    there = rows_in_motion(block, reference(), STILL, 12, 2.0, 1.0)
+    assert there.at.shape[1] == 12
+    np.testing.assert_allclose(there.y, there.motion(there.acc), atol=1e-6)
+
+
 def test_what_stamps_miss_is_the_change_in_the_time_that_they_are_off_by() -> None:
     even = np.arange(5.0, 30.0, 0.02)
     off = np.random.default_rng(4).normal(0, 2e-3, len(even))

@@ -115,6 +115,27 @@ def test_a_wave_passes_low_passes_of_both_orders_in_turn() -> None:
     np.testing.assert_allclose(both, expected, atol=6e-5)
 
 
+def test_a_mean_over_samples_of_a_wave_is_a_smaller_wave() -> None:
+    offsets = 0.01 * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+    found = REFERENCE.averaged_over(offsets, 0.0125)
+    smaller = np.cos(np.multiply.outer(offsets, W)).mean(axis=0)
+    expected = waves(INSIDE, gain=smaller)
+    np.testing.assert_allclose(found.at(INSIDE), expected, atol=1e-5)
+    change = smaller * W * np.cos(W * INSIDE[:, None] + np.arange(6))
+    np.testing.assert_allclose(found.at(INSIDE, 1), change, atol=2e-3)
+    apart = np.diff(found.splines[0][1].x)
+    np.testing.assert_allclose(apart, apart[0], rtol=1e-9)
+    assert apart[0] == pytest.approx(0.0125, rel=1e-3)
+
+
+def test_a_mean_keeps_pauses_of_the_reference() -> None:
+    t = T[(T < 2.0) | (T > 2.5)]
+    found = Reference(Block.of(t, waves(t)[:, :3], waves(t)[:, 3:]))
+    mean = found.averaged_over(np.array([-0.01, 0.0, 0.01]), 0.02)
+    knots = mean.splines[0][1].x
+    assert np.diff(knots).max() == pytest.approx(0.52) and len(knots) < 600
+
+
 def test_before_its_first_sample_a_reference_is_as_at_it() -> None:
     even = np.arange(0.0, 4.0, 0.01)
     rising = np.repeat(even[:, None], 6, axis=1)

@@ -188,6 +188,21 @@ def test_the_butterworth_filter_of_a_simulator_is_one_below_nothing() -> None:
 
 
 @pytest.mark.thorough
+def test_a_mount_as_soft_along_every_axis_is_nearly_a_filter() -> None:
+    """To second order it is the inverse of a low-pass, and a delay."""
+    one, found, _ = compared(19, 34_100)
+    softest, stiffest = (
+        np.max(one.device["compliance"]),
+        np.min(one.device["compliance"]),
+    )
+    assert softest < 1.06 * stiffest
+    effects = [d for d in found.differences if d.id not in CALIBRATION]
+    told = {name for d in effects for name in (d.id, *d.aliases)}
+    assert told == {"flexible_mount", "bandwidth", "time_delay"}
+    assert found.verdict == "ambiguous"
+
+
+@pytest.mark.thorough
 def test_stamps_of_a_coarse_clock_are_told_from_samples_that_are_uneven(
     true: Block,
 ) -> None:

@@ -59,7 +59,7 @@ def compare_in_motion(
     found = explain_motion(
         block, about, Reference(sim), align_motion(block, sim, names)
     )
-    standing = found.posterior.probable_causes()
+    standing = found.probable_causes()
     wide, _ = with_typical_calibration(found.inferred.fit.dictionary, found.set)
     state = _with_sizes(found, wide)
     free = _with_sizes(found, free_calibration_sizes(found, wide))

@@ -8,7 +8,7 @@ alignment is a column of every fit, so its uncertainty is part of all results.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,9 +16,10 @@ from fieldcal.against.motion.alignment import CommonMotion
 from fieldcal.against.motion.fit import MotionFit, lag_of
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
+from fieldcal.model import thresholds
 from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.probabilities import Posterior
+from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
 from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import (
     Alignment,
@@ -28,6 +29,7 @@ from fieldcal.model.rows.motion import (
 )
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.search.inference import InferenceResult
+from fieldcal.model.search.variations import ALTERNATIVE_MARGIN
 from fieldcal.model.state import State
 from fieldcal.model.system.motion_rows import MotionSystem
 from fieldcal.physics.lag import Lag
@@ -64,12 +66,17 @@ class MotionExplanation:
     fit : alignment and noise
     inferred : the best set of causes, its state, and the search
     posterior : probabilities of all causes
+    evidence : ln, including that of the noise
+    rivals : explanations with other causes, found from other filters, that are nearly
+        as likely; the best set is not linear enough to show them
 
     """
 
     fit: MotionFit
     inferred: InferenceResult
     posterior: Posterior
+    evidence: float
+    rivals: tuple[MotionExplanation, ...] = ()
 
     @property
     def rows(self) -> MotionRows:
@@ -85,6 +92,35 @@ class MotionExplanation:
     def set(self) -> Set:
         """The best set of causes."""
         return self.inferred.best
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the causes of the best set."""
+        return frozenset(Posterior.cause_names(self.set))
+
+    def probable_causes(self) -> list[ProbableCause]:
+        """Causes that are likelier present than absent, with rivals' as aliases."""
+        causes = [self._beside_rivals(c) for c in self.posterior.probable_causes()]
+        return [c for c in causes if c.probability >= thresholds.NAMED]
+
+    def _beside_rivals(self, cause: ProbableCause) -> ProbableCause:
+        """A cause with the probability that rivals without it leave to it.
+
+        Rivals that stand for the best set give it aliases instead.
+        """
+        without = [r for r in self.rivals if cause.name not in r.names]
+        near = [r for r in without if self._behind(r) < thresholds.ALIAS_LOG_MARGIN]
+        weight = sum(np.exp(-self._behind(r)) for r in self.rivals)
+        taken = sum(np.exp(-self._behind(r)) for r in without if r not in near)
+        added = sorted(frozenset().union(*(r.names for r in near)) - self.names)
+        return replace(
+            cause,
+            probability=cause.probability * float(1 - taken / (1 + weight)),
+            aliases=tuple(dict.fromkeys((*cause.aliases, *added))),
+        )
+
+    def _behind(self, rival: MotionExplanation) -> float:
+        return self.evidence - rival.evidence
 
 
 def explain_motion(
@@ -109,7 +145,18 @@ def explain_motion(
     dictionary = MotionDictionary(rows, np.abs(nominal.scale))
     system = MotionSystem(dictionary, _starting_power(rows, nominal))
     plain = MotionFit(system, nominal, Bands.between(rows.frequency), start.hz)
-    fit = _likeliest_fit(plain, dictionary)
+    explained = [_explained(fit) for fit in _likely_fits(plain, dictionary)]
+    best = max(explained, key=lambda one: one.evidence)
+    rivals = {
+        one.names: one
+        for one in sorted(explained, key=lambda one: one.evidence)
+        if one.names - best.names and one.evidence > best.evidence - ALTERNATIVE_MARGIN
+    }
+    return replace(best, rivals=tuple(rivals.values()))
+
+
+def _explained(fit: MotionFit) -> MotionExplanation:
+    """Search from a fit, and repeat both with the causes found."""
     found = fit.search(())
     for _ in range(MAX_SEARCHES):
         before, members = found.best.keys, found.best.members
@@ -118,22 +165,24 @@ def explain_motion(
         if found.best.keys == before:
             break
     fit, found = _without_idle_lags(fit, found)
-    return MotionExplanation(fit, found, Posterior(found.search, found.best))
+    evidence = fit.evidence(found.best.members)
+    return MotionExplanation(fit, found, Posterior(found.search, found.best), evidence)
 
 
-def _likeliest_fit(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
-    """The fit to begin the search with: with a filter or another effect of motion.
+def _likely_fits(fit: MotionFit, dictionary: MotionDictionary) -> list[MotionFit]:
+    """Fits to begin a search with: with a filter or another effect of motion.
 
     The effect of a filter is linear about a similar filter, but not about none. Among
     the effects that show only in motion and that explain something, the likeliest is
-    taken; those that explain most are tried first. An effect other than a filter is
+    taken, and those that come near it; those that explain most are tried first. An
+    effect other than a filter is
     skipped if it explains nothing beside the one just tried. Filters of first and of
     second order are both tried always, since either explains most of the other.
     """
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
     delays = tuple(m for m in every if lag_of(m).delay)
     fit.settle(delays)
-    best, most = fit, (nothing := fit.evidence(delays))
+    tried = [(fit, nothing := fit.evidence(delays))]
     explains = {
         i: evidence
         for i, member in enumerate(every)
@@ -147,14 +196,14 @@ def _likeliest_fit(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
         other, members = fit.copy(), (*delays, every[one])
         other.settle(members)
         own = other.evidence(members)
-        if own > most:
-            best, most = other, own
+        tried.append((other, own))
         remain = [
             i
             for i in remain
             if lag_of(every[i]) != Lag() or other.evidence((*members, every[i])) > own
         ]
-    return best
+    most = max(own for _, own in tried)
+    return [other for other, own in tried if own > most - ALTERNATIVE_MARGIN]
 
 
 def _without_idle_lags(

@@ -241,9 +241,15 @@ def read_description(path: Path) -> Description:
     try:
         raw = load_toml(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
+        lacks = f"it has no {path.name}" if path.parent.exists() else "it is not there"
         raise SessionError(
-            f"{path.parent}: is no session: it has no {path.name}; name a folder that"
-            " has one, or make one with fieldcal import"
+            f"{path.parent}: is no session: {lacks}; name a folder that has a"
+            f" {path.name}, or make one with fieldcal import"
+        ) from error
+    except NotADirectoryError as error:
+        raise SessionError(
+            f"{path.parent}: is a file, no session; make a session of it with"
+            f" fieldcal import {path.parent}"
         ) from error
     except (OSError, UnicodeDecodeError) as error:
         raise SessionError(f"{path}: cannot be read: {error}") from error

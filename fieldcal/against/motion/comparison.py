@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.against.motion.alignment import align_motion
-from fieldcal.against.motion.following import MotionExplanation, explain_motion
+from fieldcal.against.motion.explanation import MotionExplanation
+from fieldcal.against.motion.following import explain_motion
 from fieldcal.against.motion.free_calibration import (
     calibration_differences,
     determined_calibration,

@@ -8,18 +8,22 @@ alignment is a column of every fit, so its uncertainty is part of all results.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from fieldcal.against.motion.alignment import CommonMotion
+from fieldcal.against.motion.explanation import (
+    MotionExplanation,
+    Rival,
+    reportable_names,
+)
 from fieldcal.against.motion.fit import MotionFit, lag_of
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.model import thresholds
 from fieldcal.model.causes.motion_dictionary import MotionDictionary
-from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
+from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import (
     Alignment,
@@ -57,70 +61,13 @@ MAX_SEARCHES = 3
 """Most searches."""
 
 
-@dataclass(frozen=True)
-class MotionExplanation:
-    """The explanation of a recording in motion by its reference and causes.
-
-    Attributes
-    ----------
-    fit : alignment and noise
-    inferred : the best set of causes, its state, and the search
-    posterior : probabilities of all causes
-    evidence : ln, including that of the noise
-    rivals : explanations with other causes, found from other filters, that are nearly
-        as likely; the best set is not linear enough to show them
-
-    """
+@dataclass(frozen=True, slots=True)
+class _Start:
+    """A fit to begin a search with, its causes, and their ln evidence."""
 
     fit: MotionFit
-    inferred: InferenceResult
-    posterior: Posterior
+    members: tuple[Member, ...]
     evidence: float
-    rivals: tuple[MotionExplanation, ...] = ()
-
-    @property
-    def rows(self) -> MotionRows:
-        """Rows at the estimated alignment."""
-        return self.fit.rows
-
-    @property
-    def dictionary(self) -> MotionDictionary:
-        """Columns of all causes."""
-        return self.fit.system.dictionary
-
-    @property
-    def set(self) -> Set:
-        """The best set of causes."""
-        return self.inferred.best
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Names of the causes of the best set."""
-        return frozenset(Posterior.cause_names(self.set))
-
-    def probable_causes(self) -> list[ProbableCause]:
-        """Causes that are likelier present than absent, with rivals' as aliases."""
-        causes = [self._beside_rivals(c) for c in self.posterior.probable_causes()]
-        return [c for c in causes if c.probability >= thresholds.NAMED]
-
-    def _beside_rivals(self, cause: ProbableCause) -> ProbableCause:
-        """A cause with the probability that rivals without it leave to it.
-
-        Rivals that stand for the best set give it aliases instead.
-        """
-        without = [r for r in self.rivals if cause.name not in r.names]
-        near = [r for r in without if self._behind(r) < thresholds.ALIAS_LOG_MARGIN]
-        weight = sum(np.exp(-self._behind(r)) for r in self.rivals)
-        taken = sum(np.exp(-self._behind(r)) for r in without if r not in near)
-        added = sorted(frozenset().union(*(r.names for r in near)) - self.names)
-        return replace(
-            cause,
-            probability=cause.probability * float(1 - taken / (1 + weight)),
-            aliases=tuple(dict.fromkeys((*cause.aliases, *added))),
-        )
-
-    def _behind(self, rival: MotionExplanation) -> float:
-        return self.evidence - rival.evidence
 
 
 def explain_motion(
@@ -145,14 +92,12 @@ def explain_motion(
     dictionary = MotionDictionary(rows, np.abs(nominal.scale))
     system = MotionSystem(dictionary, _starting_power(rows, nominal))
     plain = MotionFit(system, nominal, Bands.between(rows.frequency), start.hz)
-    explained = [_explained(fit) for fit in _likely_fits(plain, dictionary)]
+    starts = _likely_starts(plain, dictionary)
+    every = [Rival(reportable_names(one.members), one.evidence) for one in starts]
+    explained = [_explained(one.fit) for one in starts]
     best = max(explained, key=lambda one: one.evidence)
-    rivals = {
-        one.names: one
-        for one in sorted(explained, key=lambda one: one.evidence)
-        if one.names - best.names and one.evidence > best.evidence - ALTERNATIVE_MARGIN
-    }
-    return replace(best, rivals=tuple(rivals.values()))
+    every += [Rival(one.names, one.evidence) for one in explained]
+    return best.beside(every)
 
 
 def _explained(fit: MotionFit) -> MotionExplanation:
@@ -169,20 +114,20 @@ def _explained(fit: MotionFit) -> MotionExplanation:
     return MotionExplanation(fit, found, Posterior(found.search, found.best), evidence)
 
 
-def _likely_fits(fit: MotionFit, dictionary: MotionDictionary) -> list[MotionFit]:
+def _likely_starts(fit: MotionFit, dictionary: MotionDictionary) -> list[_Start]:
     """Fits to begin a search with: with a filter or another effect of motion.
 
     The effect of a filter is linear about a similar filter, but not about none. Among
     the effects that show only in motion and that explain something, the likeliest is
     taken, and those that come near it; those that explain most are tried first. An
-    effect other than a filter is
-    skipped if it explains nothing beside the one just tried. Filters of first and of
-    second order are both tried always, since either explains most of the other.
+    effect other than a filter is skipped if it explains nothing beside the one just
+    tried. Filters of first and of second order are both tried always, since either
+    explains most of the other.
     """
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
     delays = tuple(m for m in every if lag_of(m).delay)
     fit.settle(delays)
-    tried = [(fit, nothing := fit.evidence(delays))]
+    tried = [_Start(fit, delays, nothing := fit.evidence(delays))]
     explains = {
         i: evidence
         for i, member in enumerate(every)
@@ -196,14 +141,14 @@ def _likely_fits(fit: MotionFit, dictionary: MotionDictionary) -> list[MotionFit
         other, members = fit.copy(), (*delays, every[one])
         other.settle(members)
         own = other.evidence(members)
-        tried.append((other, own))
+        tried.append(_Start(other, members, own))
         remain = [
             i
             for i in remain
             if lag_of(every[i]) != Lag() or other.evidence((*members, every[i])) > own
         ]
-    most = max(own for _, own in tried)
-    return [other for other, own in tried if own > most - ALTERNATIVE_MARGIN]
+    most = max(one.evidence for one in tried)
+    return [one for one in tried if one.evidence > most - ALTERNATIVE_MARGIN]
 
 
 def _without_idle_lags(

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fieldcal.against.joint import probability_of_difference
+from fieldcal.against.motion.explanation import MotionExplanation
 from fieldcal.against.motion.fit import column_estimates
-from fieldcal.against.motion.following import MotionExplanation
 from fieldcal.against.result import Aligned, Difference, RealAndSimulated
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import Quantity

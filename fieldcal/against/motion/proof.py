@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.against.motion.following import MotionExplanation
+from fieldcal.against.motion.explanation import MotionExplanation
 from fieldcal.against.prediction import chi2_of_uncertain_prediction
 from fieldcal.against.result import SimulatorPrediction
 from fieldcal.core.samples import Array, Index

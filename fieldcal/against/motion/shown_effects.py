@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from fieldcal.against.motion.explanation import MotionExplanation
 from fieldcal.against.motion.fit import column_estimates
-from fieldcal.against.motion.following import MotionExplanation
 from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.result import Mismatch, Quantity

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fieldcal.against.motion.following import MotionExplanation
+from fieldcal.against.motion.explanation import MotionExplanation, Rival
 from fieldcal.model.posterior.probabilities import ProbableCause
 
 
@@ -21,11 +21,8 @@ def explanation(*rivals: tuple[set[str], float]) -> MotionExplanation:
     )
     inferred: Any = SimpleNamespace(best=SimpleNamespace(members=causes))
     fit: Any = None
-    others: Any = tuple(
-        SimpleNamespace(names=frozenset(n), evidence=100.0 - behind)
-        for n, behind in rivals
-    )
-    return MotionExplanation(fit, inferred, posterior, 100.0, others)
+    others = [Rival(frozenset(n), 100.0 - behind) for n, behind in rivals]
+    return MotionExplanation(fit, inferred, posterior, 100.0).beside(others)
 
 
 def test_without_rivals_causes_are_as_likely_as_the_search_says() -> None:
@@ -50,3 +47,15 @@ def test_a_rival_farther_behind_takes_its_share_of_the_probability() -> None:
     odds = np.exp(-5.0)  # of the rival against the best
     assert first.probability == pytest.approx(0.9 / (1 + odds)) and not first.aliases
     assert second.probability == 0.9
+
+
+def test_what_has_nothing_else_or_is_far_behind_is_no_rival() -> None:
+    found = explanation(
+        ({"bandwidth"}, 1.0), ({"time_delay"}, 2.0), ({"flexible_mount"}, 9.0)
+    )
+    assert found.rivals == ()
+
+
+def test_of_the_same_causes_the_likelier_is_the_rival() -> None:
+    found = explanation(({"cubic"}, 1.0), ({"cubic"}, 3.0))
+    assert found.rivals == (Rival(frozenset({"cubic"}), 99.0),)

@@ -40,7 +40,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     """
     if "MUTANT_UNDER_TEST" in os.environ and isinstance(item, pytest.Function):
         for value in vars(item.module).values():
-            if hasattr(value, "cache_clear"):
+            own = getattr(value, "__module__", "") == item.module.__name__
+            if own and hasattr(value, "cache_clear"):
                 value.cache_clear()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block, concat
@@ -215,6 +216,21 @@ def cells_of(sides: list[Block]) -> list[CellTable]:
         CellTable(table.times[some], table.sums[some], table.origin)
         for some in (first, ~first)
     ]
+
+
+@pytest.mark.parametrize("r", [1.0001, 1.5, 2.0, 6.0])
+def test_the_bias_function_is_that_of_the_spectrum(r: float) -> None:
+    """Power 1/f through the difference of two means over one second, r s apart."""
+    f = np.geomspace(1e-6, 3e3, 2_000_001)
+    over_one = np.sinc(f) ** 2 / f
+    power = [trapezoid(over_one * np.sin(np.pi * f * d) ** 2, f) for d in (r, 1.0)]
+    assert flicker_bias_function(r) == pytest.approx(power[0] / power[1], rel=1e-3)
+
+
+def test_a_slope_does_not_depend_on_the_level() -> None:
+    t = CELL * np.arange(40)
+    means = np.outer(t, np.arange(6.0)) + np.linspace(-9.0, 9.0, 6)
+    np.testing.assert_allclose(same_attitude._slope(means), np.arange(6.0), atol=1e-9)
 
 
 def turned_in_gap(

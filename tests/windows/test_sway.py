@@ -158,6 +158,15 @@ def test_missing_samples_and_short_windows() -> None:
     assert find_sway(t[:20], six[:20], PLAIN) == []
 
 
+def test_an_angle_is_the_integral_of_its_rate() -> None:
+    """Of a swing by one degree about y, of a gyroscope in its own unit, with a bias."""
+    t, pulse = 0.1 * np.arange(300), 2 * np.pi * 0.2
+    y = np.zeros((300, 6))
+    y[:, 4] = 50 * (0.03 + np.deg2rad(1.0) * pulse * np.cos(pulse * t))
+    angle = sway._turn_angle(y, np.array([1.0, 50.0, 1.0]), 0.1)
+    np.testing.assert_allclose(np.rad2deg(np.ptp(angle, axis=0)), [0, 2, 0], rtol=0.01)
+
+
 def test_waves_are_compared_by_how_far_they_turn() -> None:
     """A twentieth of a degree is noise beside one, however fast it goes to and fro."""
     hz, turned = np.array([0.1, 0.3, 1.4]), np.deg2rad([1.0, 0.3, 0.05])

@@ -32,6 +32,19 @@ settings.register_profile("all", settings.get_profile("any machine"), max_exampl
 settings.load_profile("any machine")
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Where faults are put in one by one, each test makes anew what tests share.
+
+    The process made it before the fault was there, and what makes it would count as
+    tested by the first of them alone.
+    """
+    if "MUTANT_UNDER_TEST" in os.environ and isinstance(item, pytest.Function):
+        for value in vars(item.module).values():
+            own = getattr(value, "__module__", "") == item.module.__name__
+            if own and hasattr(value, "cache_clear"):
+                value.cache_clear()
+
+
 WAITING = (
     frozenset(
         [

@@ -153,6 +153,7 @@ def test_a_ladder_goes_to_either_side_and_has_home() -> None:
     found, sides = ladder_settings(had), (-20.0, 0.0, 20.0)
     assert sorted(found) == [(a, b) for a in sides for b in (-2.5, 0.0, 2.5)]
     assert found[0] == (0.0, 0.0) and {a for a, _ in found[:3]} == {0.0}
+    assert "-0.0" not in str(found)  # nobody sets a joint to that
     assert ladder_settings([UNKNOWN]) == [] == ladder_settings([])
 
 

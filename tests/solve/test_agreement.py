@@ -31,13 +31,15 @@ STEP = 1e-4
 
 
 def found(
-    places: tuple[Position, ...], u: Array, degrees: float = 0.0
+    places: tuple[Position, ...], u: Array, degrees: float = 0.0, counts: float = 1.0
 ) -> ParameterEstimate:
-    seen = observe(places, u)
-    seen.covariance[:, range(3), range(3)] = SIZE**2
+    """The estimate from outputs u, m/s^2, of a device with so many counts for one."""
+    seen = observe(places, counts * u)
+    seen.covariance[:, range(3), range(3)] = (counts * SIZE) ** 2
     recorded = rows_of_observations(seen)
     rows = with_base_rate(recorded.rows, np.zeros(3))
-    nominal = State(np.zeros(6), np.ones(6), np.zeros((len(places), 2)), np.zeros(3))
+    scale = np.repeat([counts, 1.0], 3)
+    nominal = State(np.zeros(6), scale, np.zeros((len(places), 2)), np.zeros(3))
     wanted = ParameterSetOptions(angles_deg=degrees)
     return estimate_parameters(
         type(recorded)(rows, recorded.since_turn), None, nominal, wanted
@@ -144,6 +146,23 @@ def test_the_furthest_is_the_largest_residual_by_what_it_was_foretold_to(
     assert far is not None and (far.window, far.axis) == (i, c)
     assert far.residual == pytest.approx(off[i, c], rel=5e-3)
     assert far.sigma == pytest.approx(sd[i, c], rel=0.1)
+
+
+@pytest.mark.parametrize("places", [PLACES[:2], PLACES[:3], PLACES])
+def test_what_checks_what_does_not_depend_on_the_unit(
+    places: tuple[Position, ...],
+) -> None:
+    """Of two positions none is checked by the other, and of three not every axis."""
+    u = noisy(places, 3)
+    si, whole = (found(places, u, counts=counts).acc for counts in (1.0, 1000.0))
+    assert np.isnan(si.held_out_rms) == (len(places) == 2)
+    assert whole.held_out_rms == pytest.approx(1000 * si.held_out_rms, nan_ok=True)
+    assert (si.largest is None) == (whole.largest is None) == (len(places) == 2)
+    if si.largest is not None and whole.largest is not None:
+        assert (whole.largest.window, whole.largest.axis) == (
+            si.largest.window, si.largest.axis
+        )  # fmt: skip
+        assert whole.largest.sigma == pytest.approx(1000 * si.largest.sigma, rel=1e-4)
 
 
 def test_forces_that_contradict_each_other_are_why_it_is_bad() -> None:

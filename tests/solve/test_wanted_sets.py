@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from typing import Any, cast
 
+import numpy as np
 import pytest
+from observed import observe
 from test_borrowed import lot
 from test_choose import fitted, session
 from test_result import observed
 
 from fieldcal.core.factory import FactoryErrors
-from fieldcal.core.positions import FIVE_POSITIONS, Position
-from fieldcal.solve import choose
+from fieldcal.core.positions import (
+    FIVE_POSITIONS,
+    TWO_POSITIONS,
+    Position,
+    specific_forces,
+)
+from fieldcal.solve import choose, solve
 from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.parameter_set import ParameterSetOptions
 
@@ -20,6 +27,8 @@ TABLE = Position("table", 0.0, 0.0, rate=(0.0, 0.0, 0.5))
 
 COARSER = FactoryErrors(1e-2, 2e-4, 9e-5)
 STATED = FactoryErrors(1e-3, 2e-5, 9e-6)
+G = 9.81
+MANY = tuple(Position.deg(a, b) for a in (-60, -20, 20, 60, 120) for b in (-60, 0, 45))
 
 
 def by_grade(
@@ -157,3 +166,23 @@ def test_tables_and_turns_give_the_whole_matrix_of_gyroscopes(
     # windows alone choose the tilt
     alone = wanted(monkeypatch, turns="turns", asked=("base_tilt", None, False))
     assert not (alone.gyr_scale or alone.gyro_cross or alone.turned)
+
+
+@pytest.mark.parametrize(
+    ("k2", "size"), [(0.0, STATED.quadratic), (3e-4, COARSER.quadratic)]
+)
+def test_many_positions_tell_how_straight_a_device_is(k2: float, size: float) -> None:
+    force = specific_forces(MANY, G)
+    seen = observe(MANY, force + k2 * force**2, sigma=1e-4)
+    found = solve(seen, cross=True, factory=COARSER, at_best=STATED)
+    assert found.info["quadratic_sigma"] == size
+    value, sigma = found.vector("acc_scale")
+    assert np.abs((value - 1) / sigma).max() < 3
+
+
+def test_two_positions_tell_nothing_and_the_coarser_grade_stays() -> None:
+    seen = observe(TWO_POSITIONS, specific_forces(TWO_POSITIONS, G), sigma=1e-4)
+    found = solve(seen, factory=COARSER, at_best=STATED)
+    assert found.info["quadratic_sigma"] == COARSER.quadratic
+    alone = solve(seen, factory=COARSER)
+    np.testing.assert_allclose(found.covariance, alone.covariance)

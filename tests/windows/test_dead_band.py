@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.dead_band import dead_bands, error_of_means
+from fieldcal.windows.dead_band import (
+    dead_band_messages,
+    dead_bands,
+    error_of_means,
+)
 
 BAND = 0.05
 
@@ -68,3 +72,19 @@ def test_what_is_zero_for_another_reason_is_no_dead_band() -> None:
     sparse = np.where(np.arange(len(smooth))[:, None] % 7, coarse, np.nan)
     for some in (smooth, lost, coarse, told, cut, sparse, np.zeros_like(smooth)):
         assert not of_triads(some, some).any()
+
+
+def test_the_operator_reads_which_outputs_hide_what() -> None:
+    """Each triad in its unit; not where no window measured as little as that."""
+    acc, gyr = banded(swung(3)), swung(4)
+    gyr[:, 1] = 0.4 * banded(gyr[:, 1])
+    acc[7], gyr[7, 1] = BAND, 0.4 * BAND
+    block = Block.of(np.arange(len(acc)) / 100.0, acc, gyr)
+    means = np.array([[0.0, 3.0, 9.0, 0.0, 0.5, 0.0], [9.0, 3.0, 0.02, 1.0, 0.5, 1.0]])
+    (line,) = dead_band_messages(block, means)
+    assert line.startswith("ax and az are zero where less than 0.05 m/s² is measured")
+    means[:, :3] = 9.0
+    assert list(dead_band_messages(block, means)) == []
+    means[1, 4] = -0.03
+    (line,) = dead_band_messages(block, means)
+    assert line.startswith("gy is zero where less than 0.02 rad/s is measured")

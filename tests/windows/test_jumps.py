@@ -79,20 +79,81 @@ def test_what_was_recorded_while_it_turned_is_no_such_recording() -> None:
     assert found(coarse) == []
 
 
-def test_who_walks_about_rests_nowhere() -> None:
+def test_a_position_ends_with_its_last_row_whatever_the_rate_of_the_others() -> None:
+    """Rows of the later rests are three times as far apart."""
+    lengths, jumps = [50, 40, 70, 60], JumpFinder()
+    t = np.cumsum(np.repeat([0.02, 0.06], [91, 129]))
+    jumps.add(Block.of(t, rests(3, lengths)))
+    last = np.cumsum(lengths) - 1
+    ends = [end for _, end in jumps.positions]
+    np.testing.assert_allclose(ends, t[last], atol=2e-3)
+
+
+@pytest.mark.parametrize("dead", [False, True])
+def test_who_walks_about_rests_nowhere(dead: bool) -> None:
+    """Nor does who has an axis that gives the same number all the time."""
     for seed in (2, 4, 5, 6):
         rng = np.random.default_rng(seed)
         beat = np.outer(np.arange(270), [0.42, 0.84, 0.63]) + [0, 1, 2]
         walk = [0, G, 0] + 3.4 * np.sin(beat) + rng.normal(0, 2.0, (270, 3))
         rest = np.repeat([[-1.0, 9.6, -1.3], [2.7, 9.4, -0.3]], [60, 120], axis=0)
         rest += rng.normal(0, 5 * NOISE, rest.shape)
-        assert found(np.vstack([rest[:60], walk, rest[60:]])) == []
+        acc = np.vstack([rest[:60], walk, rest[60:]])
+        acc[:, 2] = -1.0 if dead else acc[:, 2]
+        assert found(acc) == []
 
 
 def test_coarse_rows_of_which_some_stay_and_others_flicker_rest_alike() -> None:
     acc = np.round(rests(1, [80, 60, 90]) / 0.15) * 0.15
     acc[:80] = acc[40]
     assert len(found(acc)) == 3
+
+
+def apart_by(some: Array) -> Array:
+    """Four rests of 60 rows, the same every time, and some rows (m, 3) between two."""
+    held = np.split(rests(8, [60] * 4), 4)
+    parts = [held[0]]
+    for one in held[1:]:
+        parts += [parts[-1][-1] + some, one]
+    return np.vstack(parts)
+
+
+def test_a_jump_may_have_a_wild_row_beside_it_and_no_turn_of_rows() -> None:
+    """A row in the middle is one; a turn of three rows was recorded, if a quick one."""
+    assert len(found(apart_by(np.full((1, 3), 30.0)))) == 4
+    held = np.split(rests(8, [60] * 4), 4)
+    way = np.linspace(0, 1, 5)[1:4, None]
+    parts = [held[0]]
+    for one in held[1:]:
+        parts += [parts[-1][-1] + way * (one[0] - parts[-1][-1]), one]
+    assert found(np.vstack(parts)) == []
+
+
+def test_what_is_no_rest_for_a_few_rows_is_no_position_and_no_harm() -> None:
+    """While it was carried: eighteen rows that drift by the noise of a row each."""
+    drift = 1.0 + NOISE * np.arange(18)[:, None] * np.ones(3)
+    spans = found(apart_by(drift))
+    starts = np.arange(4) * (60 + 18) / HZ
+    np.testing.assert_allclose([start for start, _ in spans], starts, atol=1.5 / HZ)
+
+
+@pytest.mark.parametrize(("times", "count"), [(3.5, 4), (8.0, 0)])
+def test_rests_have_about_the_same_noise(times: float, count: int) -> None:
+    """Where the noisiest is what the noise of a row is told from."""
+    acc = rests(2, [60, 50, 70, 60])
+    acc[:60] = acc[:60].mean(axis=0) + times * (acc[:60] - acc[:60].mean(axis=0))
+    assert len(found(acc, 60)) == count
+
+
+def test_one_axis_may_be_coarser_than_the_others() -> None:
+    """Its steps are as large as its resolution, and those of rests alone no jumps."""
+    lengths = [80, 60, 90, 70]
+    acc, rng = rests(3, lengths), np.random.default_rng(1)
+    flips = rng.random(len(acc)) < 0.3
+    acc[:, 2] = np.round(acc[:, 2]) + 0.5 * flips
+    ends = np.cumsum(lengths)
+    spans = np.column_stack([ends - lengths, ends - 1]) / HZ
+    np.testing.assert_allclose(found(acc), spans)
 
 
 def test_rows_that_are_missing_are_no_jumps() -> None:
@@ -104,6 +165,9 @@ def test_rows_that_are_missing_are_no_jumps() -> None:
             assert found(np.full((90, 3), np.nan), cut) == []
             assert len(found(holed, cut)) == 4
             assert found(acc[:1], cut) == []
+        turns = acc.copy()
+        turns[np.arange(len(acc)), np.arange(len(acc)) % 3] = np.nan
+        assert found(turns) == []  # no row has all three axes
 
 
 def test_a_log_of_rests_without_times_needs_no_more_than_its_rate(

@@ -298,3 +298,14 @@ def test_the_quickest_noise_is_that_of_fourth_differences() -> None:
     np.testing.assert_allclose(
         quickest_noise([quiet[:, :1] + slow[:, :1]]), 0.5, rtol=0.03
     )
+
+
+@pytest.mark.parametrize(("walks", "sees"), [(True, 2.0), (False, None)])
+def test_white_noise_under_a_walk_is_the_rest_of_a_square(
+    walks: bool, sees: float | None
+) -> None:
+    """Levels of 4 and what grows with the square of a length; not with the length."""
+    lengths = (1, 2, 4, 8)
+    grown = np.array([1.0, 4.0, 16.0, 64.0] if walks else [1.0, 2.0, 4.0, 8.0])
+    found = noise._white_under_walk(lengths, 4 + 9 * grown, np.full(4, 0.02))
+    assert found == (sees and pytest.approx(sees))

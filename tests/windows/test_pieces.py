@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
 
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.windows import PiecedWindow
+from fieldcal.windows import PiecedWindow, average
+from fieldcal.windows.window import Window
 
 NOISE = np.array([0.02] * 3 + [2e-3] * 3)
 AT_REST = np.array([0.1, -9.8, 0.2, 1e-3, -2e-3, 3e-3])
@@ -149,3 +152,15 @@ def test_a_piece_of_too_few_samples_to_be_tested_is_not_kept() -> None:
         assert (pieces.keep_undisturbed(Moved("", seconds, "ax", 1.0)) > 0) is kept
         pieces.add(rest(rng, 60.0, 12.0, np.zeros(6), 2.0))
         assert pieces.is_full(11.0) is not kept
+
+
+def test_outputs_that_are_missing_do_not_keep_pieces_apart() -> None:
+    rng = np.random.default_rng(5)
+    pieces = []
+    for start, off in ((0.0, 0.0), (30.0, 0.0), (60.0, 0.2)):
+        block = rest(rng, start, 20.0, np.full(6, off))
+        block.gyr[:] = np.nan
+        pieces.append(average(block))
+    before, same, other = (cast(Window, mean) for mean in pieces)  # alike in both
+    assert PiecedWindow._agree(before, same)
+    assert not PiecedWindow._agree(before, other)

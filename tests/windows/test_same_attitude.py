@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
+from scipy.spatial.transform import Rotation
 
-from fieldcal.core.samples import Block, concat
+from fieldcal.core.samples import Array, Block, concat
+from fieldcal.windows import same_attitude
 from fieldcal.windows.cells import CELL, CellAccumulator, CellTable
 from fieldcal.windows.joined_rests import LEAST_PROBABILITY, RestPeriod, join_rests
 from fieldcal.windows.same_attitude import (
@@ -153,6 +156,28 @@ def test_positions_without_the_turns_between_them_are_not_one() -> None:
         assert len(rests(block)) == 4, seed
 
 
+def test_a_cone_that_ends_where_it_began_is_no_turn() -> None:
+    """The integral of its rates is the area that it encloses, and no angle."""
+    rng, size, at = np.random.default_rng(4), 0.04, (40.0, 42.0)
+    fine = np.arange(round(80 * RATE) * 8 + 1) / RATE / 8
+    part = np.clip((fine - at[0]) / (at[1] - at[0]), 0.0, 1.0)
+    around = np.column_stack(
+        [np.sin(2 * np.pi * part), 1 - np.cos(2 * np.pi * part), 0 * part]
+    )
+    held = Rotation.from_rotvec(size * around)
+    rate = (held[:-1].inv() * held[1:]).as_rotvec() * RATE * 8
+    gyr = rate.reshape(-1, 8, 3).mean(axis=1)
+    assert np.abs(gyr.sum(axis=0) / RATE).max() > 4e-3
+    t, noise = fine[8::8], rng.standard_normal((2, len(fine) // 8, 3))
+    acc = held[8::8].inv().apply([0.0, 1.0, 9.7]) + 0.01 * noise[0]
+    block = Block.of(t, acc, gyr + 0.01 + 1e-4 * noise[1])
+    gap = (39.5, 42.5)
+    sides = [block.between(30.0, gap[0]), block.between(gap[1], 52.0)]
+    way = block.between(gap[0] - CELL, gap[1] + CELL)
+    before, after = cells_of(sides)
+    assert probability_unmoved(before, way, after, gap) > LEAST_PROBABILITY
+
+
 def test_what_went_on_in_a_pause_nobody_knows() -> None:
     block = recorded(1)
     some = [block.between(0, 40.2), block.between(43.2, 200)]
@@ -191,6 +216,65 @@ def cells_of(sides: list[Block]) -> list[CellTable]:
         CellTable(table.times[some], table.sums[some], table.origin)
         for some in (first, ~first)
     ]
+
+
+@pytest.mark.parametrize("r", [1.0001, 1.5, 2.0, 6.0])
+def test_the_bias_function_is_that_of_the_spectrum(r: float) -> None:
+    """Power 1/f through the difference of two means over one second, r s apart."""
+    f = np.geomspace(1e-6, 3e3, 400_001)
+    over_one = np.sinc(f) ** 2 / f
+    power = [trapezoid(over_one * np.sin(np.pi * f * d) ** 2, f) for d in (r, 1.0)]
+    assert flicker_bias_function(r) == pytest.approx(power[0] / power[1], rel=1e-3)
+
+
+def test_a_slope_does_not_depend_on_the_level() -> None:
+    t = CELL * np.arange(40)
+    means = np.outer(t, np.arange(6.0)) + np.linspace(-9.0, 9.0, 6)
+    np.testing.assert_allclose(same_attitude._slope(means), np.arange(6.0), atol=1e-9)
+
+
+def turned_in_gap(
+    gyr: Array, level: Array, change: Array, spread: Array
+) -> tuple[Array, Array, float]:
+    """Rotation by rates (n, 3) at 50 Hz, its variance, and the largest on the way."""
+    t = np.arange(len(gyr)) / RATE
+    return same_attitude._turn_in_gap(Block.of(t, 0 * gyr, gyr), level, change, spread)
+
+
+def test_the_turn_in_a_gap_is_the_integral_of_the_rates() -> None:
+    """Of a rate that rises and falls by parabolas, beside a level."""
+    t, level, none = np.arange(101) / RATE, np.array([0.01, -0.02, 0.0]), np.zeros(3)
+    gyr = level + np.outer(t * (2.0 - t), [0.03, 0.0, -0.04])
+    turned, _, most = turned_in_gap(gyr, level, none, none)
+    np.testing.assert_allclose(turned, [0.04, 0.0, -0.16 / 3], rtol=2e-4, atol=1e-12)
+    assert most == pytest.approx(0.2 / 3, rel=2e-4)
+    gyr = level + np.outer(np.linspace(0.0, 0.06, 101), [1.0, 0.0, 0.0])
+    turned, _, most = turned_in_gap(gyr, level, none, none)  # whichever end it grows to
+    np.testing.assert_allclose([turned[0], most], 0.06, rtol=1e-9)
+
+
+def test_the_turn_in_a_gap_is_as_uncertain_as_what_it_is_made_of() -> None:
+    """The level beside the gap, a jump of it within, white noise, and finite angles."""
+    none, still = np.zeros(3), np.zeros((101, 3))
+    # both sides are off by 1 and 3 mrad/s: their mean by half the root of the squares
+    side = np.array([1e-3, 3e-3])
+    _, variance, _ = turned_in_gap(still, none, none, np.full(3, side @ side))
+    np.testing.assert_allclose(variance, (2.0 * np.hypot(*side) / 2) ** 2)
+    # a jump at any instant of two seconds, where half of it is taken off
+    jump, at = 4e-3, (np.arange(1000) + 0.5) / 500
+    missed = jump * (2.0 - at) - jump * 1.0
+    _, variance, _ = turned_in_gap(still, none, np.full(3, jump), none)
+    np.testing.assert_allclose(variance, (missed**2).mean(), rtol=1e-5)
+    noise = 2e-3 * np.random.default_rng(6).standard_normal((20_001, 3))
+    _, variance, most = turned_in_gap(noise, none, none, none)
+    white = 20_001 * (2e-3 / RATE) ** 2
+    np.testing.assert_allclose(variance - (most**2 / 2) ** 2, white, rtol=0.06)
+    # two turns by 0.08 rad about axes across each other differ by half a product in
+    # the two orders
+    one, other = (Rotation.from_rotvec(0.08 * axis) for axis in np.eye(3)[:2])
+    apart = (one * other).as_rotvec() - [0.08, 0.08, 0.0]
+    _, variance, _ = turned_in_gap(still + [0.04, 0.0, 0.0], none, none, none)
+    np.testing.assert_allclose(np.sqrt(variance), np.linalg.norm(apart), rtol=0.03)
 
 
 @pytest.mark.statistical

@@ -411,3 +411,13 @@ def test_a_device_of_which_nothing_ever_varies_is_at_rest_or_stuck() -> None:
     block = Block.of(np.arange(2000) / 100, np.zeros((2000, 3)) + [0, 0, 9.81])
     for start, end in still_stretches(block):
         assert end - start > 15
+
+
+def test_only_what_goes_on_is_joined_at_a_seam() -> None:
+    """A rest that another follows at once, after a jerk, is one of its own."""
+    parts: list[list[tuple[float, float]]] = [
+        [(0.0, 9.9)], [(10.0, 12.0), (15.0, 20.0)], [(20.1, 30.0)], [], [(31.0, 40.0)],
+    ]  # fmt: skip
+    joined = stretches._join_at_seams(parts, [False, True, False, True, True])
+    assert joined == [(0.0, 12.0), (15.0, 20.0), (20.1, 30.0), (31.0, 40.0)]
+    assert stretches._join_at_seams([[], [(1.0, 2.0)]], [False, True]) == [(1.0, 2.0)]

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows import Stillness
+from fieldcal.windows import Stillness, sway
 from fieldcal.windows.sway import find_sway
 from fieldcal.windows.sway_process import needed_seconds
 from fieldcal.windows.sway_waves import SwayWaves
@@ -156,6 +156,29 @@ def test_missing_samples_and_short_windows() -> None:
     rest = np.nanmean(six - found[0].outputs(t), axis=0)
     assert np.abs((rest - REST) / NOISE * np.sqrt(len(t))).max() < 4
     assert find_sway(t[:20], six[:20], PLAIN) == []
+
+
+def test_an_angle_is_the_integral_of_its_rate() -> None:
+    """Of a swing by one degree about y, of a gyroscope in its own unit, with a bias."""
+    t, pulse = 0.1 * np.arange(300), 2 * np.pi * 0.2
+    y = np.zeros((300, 6))
+    y[:, 4] = 50 * (0.03 + np.deg2rad(1.0) * pulse * np.cos(pulse * t))
+    angle = sway._turn_angle(y, np.array([1.0, 50.0, 1.0]), 0.1)
+    np.testing.assert_allclose(np.rad2deg(np.ptp(angle, axis=0)), [0, 2, 0], rtol=0.01)
+
+
+def test_waves_are_compared_by_how_far_they_turn() -> None:
+    """A twentieth of a degree is noise beside one, however fast it goes to and fro."""
+    hz, turned = np.array([0.1, 0.3, 1.4]), np.deg2rad([1.0, 0.3, 0.05])
+    zero = np.zeros((3, 6))
+    rates = np.outer(turned * 2 * np.pi * hz, [0.0, 0.0, 0.0, 0.6, 0.0, 0.8])
+    waves = SwayWaves(
+        hz, 0.0, zero, rates, REST[:3], np.zeros(3), np.zeros(6), NOISE**2, 0.1,
+        (0.0, 30.0), PLAIN,
+    )  # fmt: skip
+    kept = sway._significant(waves)
+    np.testing.assert_array_equal(kept.hz, [0.1, 0.3])
+    np.testing.assert_array_equal(kept.sin, rates[:2])
 
 
 def test_slow_and_irregular_swaying_needs_longer_windows() -> None:

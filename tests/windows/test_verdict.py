@@ -327,3 +327,13 @@ def test_a_stream_of_whole_steps_without_noise_is_at_rest(
             assert (
                 np.abs(found.mean[:3] - acc.mean(axis=0)) < 4 * found.sigma[:3]
             ).all()
+
+
+@pytest.mark.parametrize(
+    ("channel", "what"), [(2, "a 0.6 s push of 5"), (3, "a 0.6 s turn at 5")]
+)
+def test_a_gyroscope_is_turned_and_an_accelerometer_pushed(
+    channel: int, what: str
+) -> None:
+    departure = Departure(4.0, "push", channel, 12.0, 0.6, 0.5, 0.01)
+    assert departure._push("5") == what

@@ -80,6 +80,8 @@ def test_cosines_are_those_that_rows_show() -> None:
         y = np.hstack([x.f, x.w]) + SD * rng.normal(size=(len(x), 6))
         y[:, 2] += size * G * walk
         modes.append(lean_modes(rows_of(x, y)))
+        y[:, 3:] = np.nan  # accelerometers alone show it as well
+        np.testing.assert_array_equal(lean_modes(rows_of(x, y)), modes[-1])
     assert (np.array(modes)[:, 8] == 0).all(), "its angles are set"
     assert modes[0][:8].min() >= 15 and modes[1][:8].max() <= 4
     assert modes[2][:8].max() <= 4 and modes[2][:8].mean() < modes[0][:8].mean() / 4

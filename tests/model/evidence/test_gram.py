@@ -90,6 +90,8 @@ def test_a_column_that_two_causes_have_may_stand_there_twice(seed: int) -> None:
     found = Eliminated.of(one.gram.with_instability(TAU), twice, wide)
     assert found.score == pytest.approx(one.dense.evidence(twice, wide), rel=1e-9)
     assert_agree(found.estimate, one.dense.posterior(twice, wide)[0])
+    # that of a member comes after that of what is always there
+    assert found.places_of(np.array([3, 0])).tolist() == [2, 0]
 
 
 def test_with_nothing_in_it_the_evidence_is_that_of_the_noise() -> None:
@@ -121,7 +123,7 @@ def test_the_gain_of_one_more_group_is_the_rise_of_the_evidence(
 
 @SEEDS
 @FREE
-@pytest.mark.parametrize("kind", [0, 4, CLOSURE])
+@pytest.mark.parametrize("kind", [0, 5, CLOSURE])
 def test_the_gain_of_an_instability_is_the_rise_of_the_evidence(
     seed: int, free: tuple[int, ...], kind: int
 ) -> None:

@@ -16,7 +16,12 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Sets
-from fieldcal.model.posterior.held_out import HeldOut, folds, held_out_residuals
+from fieldcal.model.posterior.held_out import (
+    HeldOut,
+    folds,
+    held_out_residuals,
+    held_out_turn_residuals,
+)
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
@@ -248,3 +253,7 @@ def test_squares_are_those_of_the_covariance() -> None:
         cov = one.dense.cov[np.ix_(at, at)]
         expected = rest[:, c] @ np.linalg.solve(cov, rest[:, c])
         assert squares[c] == pytest.approx(expected, rel=1e-9)
+
+
+def test_where_nothing_turned_no_turn_is_foretold() -> None:
+    assert held_out_turn_residuals(refit(()).fitted, []).shape == (0,)

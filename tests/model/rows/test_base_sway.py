@@ -189,6 +189,32 @@ def test_between_windows_a_device_that_only_sways_turns_by_nothing() -> None:
         assert abs(angle) < np.deg2rad(0.004)
 
 
+def test_two_stretches_of_a_window_are_as_uncertain_as_their_mean() -> None:
+    """A window of eighty seconds beside some of thirty, on a base that sways."""
+    rng, rate = np.random.default_rng(2), 25.0
+    t = np.arange(0.0, 210.0, 1 / rate)
+    turned = np.deg2rad(0.9) * np.sin(2 * np.pi * 0.31 * t)
+    six = rng.normal(size=(len(t), 6)) * NOISE
+    six[:, 1] += G0 * np.cos(turned)
+    six[:, 2] -= G0 * np.sin(turned)
+    six[:, 3] += np.gradient(turned, t)
+    held = [(2.0, 32.0), (40.0, 70.0), (78.0, 158.0), (168.0, 198.0)]
+    about = description.parse_description(
+        {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
+                      for a, b in held]}
+    )  # fmt: skip
+    block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
+    found = find_base_sway(block, about)
+    assert found is not None
+    for (start, end), excess in zip(held, found.excess_variance, strict=True):
+        some = (t >= start) & (t < end)
+        parts = find_sway(t[some], six[some], np.ones(3))
+        assert len(parts) == 1 + (end - start > 40)
+        # means of independent stretches of the same length
+        draws = np.array([one.excess_variance for one in parts])
+        np.testing.assert_allclose(excess, draws.mean(axis=0) / len(parts), rtol=0.05)
+
+
 @pytest.mark.thorough
 def test_means_of_windows_pull_right(tmp_path: Path) -> None:
     pulls = []

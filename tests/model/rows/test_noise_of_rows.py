@@ -115,3 +115,21 @@ def test_samples_that_are_missing_do_not_hide_what_means_have_in_common() -> Non
     np.testing.assert_allclose(shared_rounding_sigma(block, WINDOWS, off), told)
     block.gyr[:2000, 2] = np.nan
     assert shared_rounding_sigma(block, WINDOWS, off)[5] == 0, "one window is left"
+
+
+def test_what_does_not_move_is_off_by_the_same_in_every_window() -> None:
+    """By all of its error; one window in which it shook does not change that."""
+    step, held = 0.3, np.tile([0.13, -0.4, 0.55], (6000, 1))
+    windows = (np.arange(0, 6000, 1000)[:, None] + [0, 900]).astype(np.intp)
+    rng = np.random.default_rng(2)
+    on_the_way = np.arange(6000) % 1000 > 900
+    held[on_the_way] += 5 * rng.standard_normal((int(on_the_way.sum()), 3))
+    still = step * np.round(held / step)
+    held[2000:2900] += step * rng.standard_normal((900, 3))
+    shaken = step * np.round(held / step)
+    sigma = np.full((6, 6), 0.02)
+    for rates, least in ((still, 0.0199), (shaken, 0.01)):
+        block = Block.of(np.arange(6000) / RATE, 9 * rng.standard_normal((6000, 3)),
+                         rates)  # fmt: skip
+        alike = shared_rounding_sigma(block, windows, sigma)[3:]
+        assert (alike > least).all() and (alike < 0.0201).all()

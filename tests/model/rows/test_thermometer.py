@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows import thermometer
 from fieldcal.model.rows.thermometer import Thermometer
 
 T: Array = np.arange(0.0, 360.0, 0.1)
@@ -115,3 +116,18 @@ def test_from_a_tenth_of_a_kelvin_a_change_is_one(change: float, shows: bool) ->
     values = 20.0 + change * t / 300.0
     found = Thermometer.of(Block.of(t, np.zeros((len(t), 3)), None, values))
     assert found.changes == shows
+
+
+def test_local_fits_are_those_of_all_means_within_their_span() -> None:
+    """Of each instant by itself, weighted; both ends of a span are within it."""
+    rng = np.random.default_rng(7)
+    t = 400.0 + np.arange(60.0)
+    y, weight = 20 + rng.standard_normal(60), rng.uniform(1.0, 3.0, 60)
+    value, slope = thermometer._line(t, y, weight, 5.0)
+    rate = thermometer._slope(t, y, weight, 5.0)
+    for i, now in enumerate(t):
+        near = np.abs(t - now) <= 5.0
+        s, w = t[near] - now, np.sqrt(weight[near])
+        line, bent = (np.polyfit(s, y[near], k, w=w)[::-1] for k in (1, 2))
+        np.testing.assert_allclose([value[i], slope[i]], line, rtol=1e-7)
+        assert rate[i] == pytest.approx(bent[1], rel=1e-6)

@@ -78,6 +78,21 @@ def test_a_time_constant_is_found_between_the_points_of_its_grid() -> None:
     assert chi2(found) == pytest.approx(1.0, abs=0.2)
 
 
+def test_what_a_part_told_is_begun_with_and_what_it_told_wrongly_is_dropped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its members are of another dictionary; nothing else is begun with."""
+    told = settling()
+    causes = {c.key: c for c in told.fit.dictionary.causes}
+    wrong = (causes["cubic"], causes["cubic"].variants[0])
+    fit = fit_of(state_of(SETTLING))
+    monkeypatch.setattr(Inference, "_search_from_nominal", None)
+    found = Inference(fit).run((*told.best.members, wrong))
+    assert found.best.keys == {"settling:acc"}
+    (group,) = (g for _, g in found.best.members)
+    assert group.shape["tau_s"] == pytest.approx(TAU, rel=0.05)
+
+
 def test_the_state_is_what_the_columns_say() -> None:
     found, d = settling(), settling().fit.dictionary
     values = found.values

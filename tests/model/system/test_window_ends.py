@@ -20,7 +20,8 @@ RNG = np.random.default_rng(8)
 @pytest.fixture(scope="module")
 def read() -> tuple[Dictionary, Array, list[Any], WindowEnds]:
     """Dictionary, standard deviations, linearised rows and what is read from them."""
-    d = dictionary(X, common=2e-3)
+    d = dictionary(X)
+    d.window_error = RNG.uniform(1e-3, 3e-3, (9, 6))
     rows = rows_of(X, RNG.normal(size=(len(X), 6)))
     rows.sd[:] = SD * RNG.uniform(0.5, 2.0, (len(X), 6))
     linear = WindowSystem(rows, d).linearised(nominal())
@@ -42,7 +43,9 @@ def test_columns_residuals_and_variances_of_the_means_of_windows(read: Read) -> 
             np.testing.assert_allclose(found.means[p, c], expected, atol=1e-12)
             white = linear[c].white[at] / linear[c].weight[at]
             assert found.residuals[p, c] == pytest.approx(weight @ white / weight.sum())
-            assert found.variances[p, c] == pytest.approx(4e-6 + 1 / weight.sum())
+            assert found.variances[p, c] == pytest.approx(
+                d.window_error[p, c] ** 2 + 1 / weight.sum()
+            )
 
 
 def test_a_base_that_is_knocked_goes_with_the_turn_from_the_row_at_its_end(

@@ -19,13 +19,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fieldcal.acceptance.change import usual_values
 from fieldcal.acceptance.verification import Verification
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
 from fieldcal.core.positions import specific_forces
 from fieldcal.evaluation.observations import angle_setting
-from fieldcal.history.family import next_run_distribution
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 from fieldcal.solve.reliability import WrongAngles
@@ -161,14 +161,6 @@ def _shown_by_family(
     """Contribution to l^2 of earlier calibrations, which would differ from this one."""
     seen = [0.0]
     for name, moved in wrong.moves.items():
-        earlier = [c for c in family or () if name in c.names]
-        repeat = limits.repeat(group_of(name))
-        if not earlier or repeat is None:
-            continue
-        usual = next_run_distribution(
-            np.array([c.value(name) for c in earlier]),
-            np.array([c.uncertainty(name) for c in earlier]),
-            repeat,
-        )
-        seen.append((moved / usual.sigma(calibration.uncertainty(name))) ** 2)
+        if usual := usual_values(name, limits, family or ()):
+            seen.append((moved / usual.sigma(calibration.uncertainty(name))) ** 2)
     return max(seen)

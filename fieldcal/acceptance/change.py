@@ -13,7 +13,7 @@ from fieldcal.acceptance.check import Check, unit_suffix
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import ParameterName, group_of
-from fieldcal.history.family import next_run_distribution
+from fieldcal.history.family import FamilySpread, next_run_distribution
 
 
 def check_change(
@@ -60,18 +60,12 @@ def _compared(
     warmth: float,
 ) -> Check | None:
     """One parameter against earlier runs; all parameters share the probability."""
-    earlier = [c for c in family if name in c.names]
     parameter = ParameterName.of(name)
-    repeat = limits.repeat(parameter.group)
-    if not earlier or repeat is None:
+    usual = usual_values(name, limits, family)
+    if usual is None:
         return None
     value = calibration.value(name)
     sigma = float(np.hypot(calibration.uncertainty(name), warmth))
-    usual = next_run_distribution(
-        np.array([c.value(name) for c in earlier]),
-        np.array([c.uncertainty(name) for c in earlier]),
-        repeat,
-    )
     chance, limit = usual.chance(value, sigma), limits.family_chance / together
     ok = chance >= limit
     unit = unit_suffix(calibration.units[calibration.names.index(name)])
@@ -83,3 +77,21 @@ def _compared(
         f"{'' if ok else ': out of family; inspect the device before you use it'}"
     )
     return Check(f"{parameter.group} change", ok, says, chance, limit, "1")
+
+
+def usual_values(
+    name: str, limits: GradeLimits, family: Sequence[Calibration]
+) -> FamilySpread | None:
+    """What earlier calibrations let expect of a parameter in the next one.
+
+    None without an earlier one that has it, or if the grade has no limit for it.
+    """
+    earlier = [c for c in family if name in c.names]
+    repeat = limits.repeat(group_of(name))
+    if not earlier or repeat is None:
+        return None
+    return next_run_distribution(
+        np.array([c.value(name) for c in earlier]),
+        np.array([c.uncertainty(name) for c in earlier]),
+        repeat,
+    )

@@ -21,7 +21,7 @@ MAX_HARMLESS_RATIO = 0.1
 
 
 def harmless_scatter_note(
-    calibration: Calibration, limits: GradeLimits, sensor: str = "acc"
+    calibration: Calibration, limits: GradeLimits, sensor: str
 ) -> str:
     """Part of a sentence: why a misfit does not matter; empty if it may matter."""
     of = calibration.info if sensor == "acc" else calibration.info["gyroscopes"]

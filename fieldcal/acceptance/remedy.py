@@ -14,7 +14,7 @@ position once more.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -317,10 +317,7 @@ def _force_slopes(
     positions: Sequence[Position], about: Description, alpha: float, beta: float
 ) -> Array:
     """Derivative of the forces in device axes by an angle, (n, 3) m/s^2/rad."""
-    off = [
-        replace(p, alpha=(p.alpha or 0.0) + alpha, beta=(p.beta or 0.0) + beta)
-        for p in positions
-    ]
+    off = [p.turned(alpha, beta) for p in positions]
     change = specific_forces(off, about.gravity) - specific_forces(
         positions, about.gravity
     )

@@ -12,7 +12,7 @@ m/s^2 shows whether it matters.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -118,21 +118,12 @@ def verify(
          - specific_forces([position], about.gravity))[0]
         @ about.mounting / DERIVATIVE_STEP_RAD
         for moved in (
-            _rotated(position, DERIVATIVE_STEP_RAD, 0.0),
-            _rotated(position, 0.0, DERIVATIVE_STEP_RAD),
+            position.turned(DERIVATIVE_STEP_RAD, 0.0),
+            position.turned(0.0, DERIVATIVE_STEP_RAD),
         )
     ])  # fmt: skip
     return Verification(
         position, residual, np.sqrt(np.diag(s)), chance, s, slope, turned
-    )
-
-
-def _rotated(position: Position, alpha: float, beta: float) -> Position:
-    """The position with angles increased by alpha and beta, rad."""
-    return replace(
-        position,
-        alpha=(position.alpha or 0.0) + alpha,
-        beta=(position.beta or 0.0) + beta,
     )
 
 

@@ -24,7 +24,7 @@ from fieldcal.against.result import SimulatorPrediction
 from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet
 from fieldcal.core.samples import Array, Index
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows
@@ -56,13 +56,8 @@ def _prediction(
     rows: Rows, residual: Array, squares: float, count: int
 ) -> SimulatorPrediction:
     sizes = rms_over_parts(rows, residual)
-    acc, gyr = (_mean(sizes[part]) for part in (slice(0, 3), slice(3, 6)))
+    acc, gyr = (root_mean_square(sizes[part]) for part in (slice(0, 3), slice(3, 6)))
     return SimulatorPrediction(acc, gyr, squares / count if count else np.nan)
-
-
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
 def _simulator_values(found: DecidedCauses) -> tuple[Index, Array, Array]:

@@ -160,4 +160,4 @@ def _with_least_noise(
     quiet = np.flatnonzero(np.nan_to_num(noise, nan=np.inf) < MIN_NOISE_RATIO * wanted)
     for c in quiet:
         six[:, c] += MIN_NOISE_RATIO * wanted[c] * rng.standard_normal(len(six))
-    return replace(block, acc=six[:, :3], gyr=six[:, 3:]), tuple(quiet.tolist())
+    return block.with_six(six), tuple(quiet.tolist())

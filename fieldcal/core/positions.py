@@ -86,6 +86,11 @@ class Position:
         alpha, beta = angles.tolist()
         return alpha, beta
 
+    def turned(self, alpha: float, beta: float) -> Position:
+        """The position with both angles further by so much, rad; unknown ones are 0."""
+        alpha, beta = (self.alpha or 0.0) + alpha, (self.beta or 0.0) + beta
+        return replace(self, alpha=alpha, beta=beta)
+
 
 def table_rates(positions: Sequence[Position]) -> Array:
     """Rates of a rate table about the procedure axes, (n, 3) rad/s; 0 if not stated."""

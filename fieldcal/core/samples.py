@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -113,6 +113,10 @@ class Block:
     def six(self) -> Array:
         """Accelerometers and gyroscopes side by side, (n, 6), in `CHANNELS` order."""
         return np.hstack([self.acc, self.gyr])
+
+    def with_six(self, six: Array) -> Block:
+        """The block with other outputs (n, 6), in `CHANNELS` order."""
+        return replace(self, acc=six[:, ACC], gyr=six[:, GYR])
 
     def between(self, start: float, end: float) -> Block:
         """Samples with start <= t < end, s of device time."""

@@ -59,11 +59,6 @@ class PreparedRecording:
     spectral_lines: tuple[SpectralLine, ...]
     line_remainders: tuple[LineRemainder, ...]
 
-    @property
-    def navigation(self) -> bool:
-        """Whether the gyroscopes are of navigation grade and see the Earth turn."""
-        return self.source.about.grade == "navigation"
-
 
 def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     """Check, clean and reduce a recording.

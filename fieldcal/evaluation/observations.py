@@ -169,7 +169,7 @@ def _windows_without(
 def _without_dead_axes(block: Block) -> Block:
     """The samples with dead axes set to nan."""
     six = without_dead_axes(block.six)
-    return replace(block, acc=six[:, :3], gyr=six[:, 3:])
+    return block.with_six(six)
 
 
 def _average_windows(

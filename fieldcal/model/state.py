@@ -71,9 +71,9 @@ class State:
         """Delay and time constants of the sensors, by its effects."""
         return sum((t.effect.lag(t.values) for t in self.terms), Lag())
 
-    def experienced(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
+    def experienced(self, x: Experience) -> Experience:
         """Inputs of rows with small rotations, the Earth's rate and motion effects."""
-        return self.moved(self.turned(x), more)
+        return self.moved(self.turned(x))
 
     def turned(self, x: Experience) -> Experience:
         """Inputs of rows with small rotations and the Earth's rate alone."""
@@ -85,10 +85,9 @@ class State:
             x = x.turned(base_rate=x.base_rate + self.earth)
         return x
 
-    def moved(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
+    def moved(self, x: Experience) -> Experience:
         """Inputs of rows `x` from `turned` with motion effects."""
-        terms = (*self.terms, *more) if more else self.terms
-        for term in sorted(terms, key=lambda t: t.order):
+        for term in sorted(self.terms, key=lambda t: t.order):
             if isinstance(term.effect, Motion):
                 x = term.effect.change(x, term.values)
         return x
@@ -120,19 +119,27 @@ def rotate_positions(x: Experience, small_rotation: Array) -> Experience:
     x = x.turned(alpha=x.alpha + small[:, 0], beta=x.beta + small[:, 1])
     if free.any():
         f = x.f.copy()
-        one, two = perpendicular_vectors(f[free])
-        f[free] += small[free, :1] * one + small[free, 1:] * two
+        f[free] += _sideways(f[free], small[free])
         length = np.linalg.norm(f[free], axis=1, keepdims=True)
         f[free] *= np.linalg.norm(x.f[free], axis=1, keepdims=True) / length
         x = replace(x, f=f)
     spun = x.speed > 0
     if spun.any():
         w = x.w.copy()
-        one, two = perpendicular_vectors(w[spun])
-        w[spun] += small[spun, :1] * one + small[spun, 1:] * two
+        w[spun] += _sideways(w[spun], small[spun])
         w[spun] *= (x.speed[spun] / np.linalg.norm(w[spun], axis=1))[:, None]
         x = replace(x, w=w)
     return x
+
+
+def _sideways(vectors: Array, angles: Array) -> Array:
+    """Change of vectors (n, 3) by small angles (n, 2), rad, in their own unit.
+
+    Along the two vectors perpendicular to each, which are as long as it is.
+    """
+    one, two = perpendicular_vectors(vectors)
+    out: Array = angles[:, :1] * one + angles[:, 1:] * two
+    return out
 
 
 def tilt_positions(x: Experience, attitude: Array) -> Experience:

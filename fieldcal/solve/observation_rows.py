@@ -58,8 +58,7 @@ def rows_of_observations(observations: Observations) -> RecordedRows:
         mounting=observations.mounting,
         latitude=np.nan if observations.latitude is None else observations.latitude,
     )
-    free = ~x.oriented & ~x.rate.any(axis=1)
-    x = replace(x, w=np.where(free[:, None], read.earth_rates(), x.w))
+    x = read.with_earth_rates(x)
     sd[~x.force_known, :3] = np.nan
     common = np.zeros_like(sd)
     common[x.earth_unseen, 3:] = unknown_earth_rate(nominal.gyr_scale) * (n > 1)

@@ -7,7 +7,6 @@ sends zeros instead. A force or a turn needs all three axes of its sensor.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -172,6 +171,6 @@ class LiveAxisRows:
             for block in between(start, end):
                 six = block.six
                 six[:, self._dead] = np.nan
-                yield replace(block, acc=six[:, :3], gyr=six[:, 3:])
+                yield block.with_six(six)
 
         return living if len(self._dead) else between

@@ -94,7 +94,7 @@ class PiecedWindow:
         """Stretches between the pieces, s of device time."""
         return list(self._gaps)
 
-    def reason_to_stop(self, target: float | None = None) -> str | None:
+    def reason_to_stop(self, target: float | None) -> str | None:
         """As `Window.reason_to_stop`, for all pieces together."""
         if self._kept is None:
             return self._now.reason_to_stop(target)

@@ -39,6 +39,7 @@ from math import comb, log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows.cells import (
@@ -188,13 +189,12 @@ def _turn_in_gap(
     nothing = np.full(3, np.nan)
     if len(way) < 2 or not np.isfinite(way.gyr).all():
         return nothing, nothing, np.nan
-    step = np.diff(way.t)[:, None]
     rate = way.gyr - level
-    angle = np.cumsum((rate[1:] + rate[:-1]) / 2 * step, axis=0)
+    angle = cumulative_trapezoid(rate, way.t, axis=0)
     most = float(np.linalg.norm(angle, axis=1).max())
     order = min(DIFFERENCE_ORDER, len(rate) - 1)
     quick = np.diff(rate, order, axis=0) ** 2 / comb(2 * order, order)
-    drawn = len(rate) * float(np.median(step)) ** 2 * quick.mean(axis=0)
+    drawn = len(rate) * float(np.median(np.diff(way.t))) ** 2 * quick.mean(axis=0)
     bias = float(way.t[-1] - way.t[0]) ** 2 * (spread / 4 + change**2 / 12)
     return angle[-1], drawn + bias + (most**2 / 2) ** 2, most  # (4)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.rows.reduce import Rows
 
@@ -61,13 +61,8 @@ class ModelResiduals:
             if np.isfinite(v)
         }
         return Quality(
-            rms=_mean(self.rms_with_lines[part]),
+            rms=root_mean_square(self.rms_with_lines[part]),
             chi2_per_dof=self.chi2_per_dof,
-            held_out_rms=_mean(held_out[part]),
+            held_out_rms=root_mean_square(held_out[part]),
             by_channel=by_channel,
         )
-
-
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan

@@ -14,7 +14,7 @@ from fieldcal.diagnosis.findings.instant import estimate_instant
 from fieldcal.diagnosis.findings.random_sizes import (
     random_sizes,
 )
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
 from fieldcal.diagnosis.result import FoundEffect, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
@@ -53,11 +53,6 @@ def shows_mainly_in_turns(lost: CauseRemoval) -> bool:
     """Whether a cause explains nothing in windows, or less than it does in turns."""
     windows = float(np.nan_to_num(lost.squares).max())
     return windows < max(thresholds.STANDS_OUT**2, lost.turn_squares)
-
-
-def root_mean_square(values: Array) -> float:
-    """Root mean square of values (n,); nan if there are none."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
 
 
 def remove_cause(explanation: Explanation, standing: ProbableCause) -> CauseRemoval:

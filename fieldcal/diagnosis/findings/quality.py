@@ -18,7 +18,7 @@ from fieldcal.diagnosis.explain import (
     fit_calibration_only,
 )
 from fieldcal.diagnosis.findings.agreement import ModelResiduals
-from fieldcal.diagnosis.findings.found_effects import root_mean_square
+from fieldcal.diagnosis.findings.stretch_means import root_mean_square
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.posterior.held_out import (

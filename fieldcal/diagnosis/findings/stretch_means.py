@@ -40,6 +40,12 @@ def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.in
     return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
 
 
+def root_mean_square(values: Array) -> float:
+    """Root mean square of the known of some values (n,); nan if none is known."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
 def rms_over_parts(rows: Rows, residual: Array) -> Array:
     """Root mean square over the parts of windows, (6,); nan where there is none."""
     mean, _, _ = part_means(rows, residual)

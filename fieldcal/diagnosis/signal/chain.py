@@ -116,7 +116,7 @@ def _correct(
             faults.append((name, fault))
             if fault.mended is not None:
                 six = _mend_samples(block, fault)
-                block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
+                block = block.with_six(six)
                 samples = samples_to_check(block, usable, about)
     return block, samples
 

@@ -47,7 +47,7 @@ class Gram:
     within : (k, k) Phi^T R^-1 Phi of the courses of windows about their means, and of
         turns
     rhs : (k,) right-hand side of the same, Phi^T R^-1 (y - h)
-    square, count : (y - h)^T R^-1 (y - h) of the same, and their degrees of freedom
+    square : (y - h)^T R^-1 (y - h) of the same
     means : (p, 6, k) columns' means in each window
     residual : (p, 6) mean of y - h
     info : (p, 6) information on each mean by white noise, 1 / variance; 0 where nothing
@@ -64,7 +64,6 @@ class Gram:
     within: Array
     rhs: Array
     square: float
-    count: int
     means: Array
     residual: Array
     info: Array
@@ -281,14 +280,12 @@ class Eliminated:
         rhs = self.rows.rhs(columns) - shared.T @ self.estimate
         return inner * typical * typical[:, None], rhs * typical
 
-    def schur_complement_of_means(
-        self, kind: int, typical: float
-    ) -> tuple[Array, Array]:
+    def schur_complement_of_means(self, kind: int) -> tuple[Array, Array]:
         """The same for an offset of each mean of one kind of instability.
 
-        `kind` is its index 0 to 6, `typical` the typical size of the offsets.
+        `kind` is its index 0 to 6; the offsets are in outputs.
         """
-        white = self.rows.shared(kind) * typical
+        white = self.rows.shared(kind)
         ours = self.rows.white[:, self.rows.gram.index[self.columns]]
         shared = ours.T @ white
         taken = self.half @ shared

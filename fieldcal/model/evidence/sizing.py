@@ -304,7 +304,7 @@ class Sizing:
 
     def _calculate_channel_gain(self, c: int) -> Array:
         """Calculate the gain over the instabilities of one channel."""
-        inner, rhs = self.eliminated().schur_complement_of_means(c, 1.0)
+        inner, rhs = self.eliminated().schur_complement_of_means(c)
         tau = float(priors.SIZES[self.instability[c]] * self.typical_instability[c])
         information, axes = np.linalg.eigh(inner)
         information = np.clip(information, 0.0, (1 - MIN_VARIANCE_RATIO) / tau**2)

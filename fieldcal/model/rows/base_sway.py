@@ -9,7 +9,7 @@ turn then leads from one attitude at rest to the next.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -178,4 +178,4 @@ def _without_sway(
             turned = waves.turn_angle(block.t[last : last + 2].mean(keepdims=True))[0]
             six[last + 1 : start, 3:] -= waves.outputs(block.t[last + 1 : start])[:, 3:]
             six[start - 2 * few : start - few, 3:] -= turned * scale * rate / few
-    return replace(block, acc=six[:, :3], gyr=six[:, 3:])
+    return block.with_six(six)

@@ -299,8 +299,7 @@ def _experience(
         joint_turns=_joint_turns(source),
         **known_attitudes(about, position),
     )
-    free = ~x.oriented & ~x.rate.any(axis=1)
-    return replace(x, w=np.where(free[:, None], gyroscopes.earth_rates(), x.w))
+    return gyroscopes.with_earth_rates(x)
 
 
 def _joint_turns(source: RowSource) -> JointTurns:

@@ -26,7 +26,7 @@ the measured rates w_i less a bias b, which is found from the norms, linear in b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.positions import Position, table_rates, unknown_axis_speeds
 from fieldcal.core.samples import Array
 from fieldcal.model.rows.block_means import mean_of_known
+from fieldcal.physics.experience import Experience
 
 MIN_REVOLUTIONS = 1.0
 """Whole turns of a window from which what goes round is told from the mean."""
@@ -118,6 +119,11 @@ class GyroReadings:
             for p in free:
                 out[self.position == p] = self.earth * _unit(mean[p])
         return out
+
+    def with_earth_rates(self, x: Experience) -> Experience:
+        """The rows `x` with these rates where no table turns and no angle is known."""
+        free = ~x.oriented & ~x.rate.any(axis=1)
+        return replace(x, w=np.where(free[:, None], self.earth_rates(), x.w))
 
     def _pointing(self, speed: Array) -> tuple[Array, bool]:
         """Means of the positions less the bias, and whether that is determined, (3)."""

@@ -9,7 +9,7 @@ in each window is measured before that.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +76,7 @@ def measure_window_noise(
         variance[i, measured] = np.nanvar(block.acc[a:b, measured], axis=0)
         six[a:b] = without_lines(six[a:b], rate_hz)
     if loud.any():
-        block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
+        block = block.with_six(six)
     for i in np.flatnonzero(loud).tolist():
         alone = noise_of(block, windows[i : i + 1], rate_hz).white
         levels[i] = np.fmax(noise, np.fmin(levels[i], alone))

@@ -107,7 +107,6 @@ def gram(
         np.zeros((len(kept), len(kept))),
         np.zeros(len(kept)),
         0.0,
-        0,
         np.zeros((size, 6, len(kept))),
         np.zeros((size, 6)),
         np.zeros((size, 6)),
@@ -120,21 +119,21 @@ def gram(
     free = np.zeros(dictionary.width, dtype=bool)
     for j in np.flatnonzero(dictionary.unoriented):
         free[dictionary.rotations_of(held[j])] = True
-    total = [_add_windows(out, part, values, free) for part in linear]
+    squares = [_add_windows(out, part, values, free) for part in linear]
     for i, turn in enumerate(turns, len(held)):
-        total.append(_add_turn(out, i, turn, values))
+        squares.append(_add_turn(out, i, turn, values))
     if dictionary.known is not None:
-        total.append(_add_known(out, dictionary.known))
+        squares.append(_add_known(out, dictionary.known))
     for j in np.flatnonzero(dictionary.unoriented):
         at = index[dictionary.rotations_of(held[j])]
         out.free_rotations[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
-    return replace(out, square=sum(t[0] for t in total), count=sum(t[1] for t in total))
+    return replace(out, square=sum(squares))
 
 
 def _add_windows(
     out: Gram, part: LinearRows, values: Array, free: NDArray[np.bool_]
-) -> tuple[float, int]:
-    """Add one channel's rows; returns its squares about the means and their number.
+) -> float:
+    """Add one channel's rows; returns its squares about the means.
 
     Of the columns `free` (k,), rotations of unknown orientations, only the means are
     estimated. What such a rotation does within a window, where an effect turns the
@@ -157,20 +156,20 @@ def _add_windows(
     out.means[windows[:, None], c, at] = mean
     out.residual[windows, c] = middle + part.window_means(rotated)
     out.info[windows, c] = weight
-    return float(white @ white) - float(weight @ middle**2), len(white) - len(windows)
+    return float(white @ white) - float(weight @ middle**2)
 
 
-def _add_known(out: Gram, known: KnownRows) -> tuple[float, int]:
-    """Add prior knowledge of columns; returns its squares and their number."""
+def _add_known(out: Gram, known: KnownRows) -> float:
+    """Add prior knowledge of columns; returns its squares."""
     all_ = out.index[known.columns]
     at, design = all_[all_ >= 0], known.design[:, all_ >= 0]
     out.within[np.ix_(at, at)] += design.T @ design
     out.rhs[at] += design.T @ known.residual
-    return float(known.residual @ known.residual), len(known.residual)
+    return float(known.residual @ known.residual)
 
 
-def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, int]:
-    """Add a turn's closure and way; returns the way's squares and their number."""
+def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> float:
+    """Add a turn's closure and way; returns the way's squares."""
     all_, count = out.index[turn.columns], len(turn.closure)
     selected = all_ >= 0
     at = all_[selected]
@@ -178,9 +177,9 @@ def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, 
     out.means[i, :count, at] = turn.design[:, selected].T
     out.closure_errors[i, :count] = turn.closure_errors
     if not len(turn.way):
-        return 0.0, 0
+        return 0.0
     on_way = selected & turn.way_design.any(axis=0)  # few: what no window shows
     at, design = all_[on_way], turn.way_design[:, on_way]
     out.within[np.ix_(at, at)] += design.T @ design
     out.rhs[at] += design.T @ turn.way
-    return float(turn.way @ turn.way), len(turn.way)
+    return float(turn.way @ turn.way)

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross
@@ -27,9 +28,7 @@ were clipped, or that the device was turned otherwise than its positions say."""
 
 def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
     """Means (k, ...) between indices cut (k + 1,) of values (n, ...) at instants t."""
-    gaps = np.diff(t).reshape(-1, *[1] * (values.ndim - 1))
-    total = np.zeros_like(values, dtype=float)
-    total[1:] = np.cumsum((values[1:] + values[:-1]) / 2 * gaps, axis=0)
+    total = cumulative_trapezoid(values, t, axis=0, initial=0)
     length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
     mean: Array = np.diff(total[cut], axis=0) / length
     return mean

@@ -23,6 +23,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross
@@ -117,9 +118,7 @@ class Turn:
         `rate_error` (m + 1, 3, k) are k courses of rate errors dW / s, rad/s.
         """
         at_start = np.einsum("mji,mjk->mik", self.attitude, rate_error)  # axes of p
-        steps = np.diff(self.x.t)[:, None, None]
-        phi = np.zeros_like(at_start)
-        phi[1:] = np.cumsum((at_start[1:] + at_start[:-1]) / 2 * steps, axis=0)
+        phi = cumulative_trapezoid(at_start, self.x.t, axis=0, initial=0)
         out: Array = phi - self.done[:, None, None] * phi[-1]
         return out
 

@@ -110,11 +110,16 @@ class UlogFile(Recording):
         slot = self._slot("ACC", identifier)
         if slot is None:
             return told | {"installed": None}
-        other = self._slot("GYRO", self._gyroscope(topic, number))
-        other = None if other == slot else other
+        gyroscope = self._gyroscope(topic, number)
+        other = self._slot("GYRO", gyroscope)
         params = self._log.parameters
-        names = parameter_names(PX4, slot, other).values()
-        values = {n: params[n] for some in names for n in some if n in params}
+        # without an own set, those of the accelerometer's number are another sensor's
+        strange = other is None and gyroscope and self._has_slots("GYRO")
+        other = None if other == slot else other
+        names = parameter_names(PX4, slot, other)
+        if strange:
+            del names["gyr_offset"]
+        values = {n: params[n] for some in names.values() for n in some if n in params}
         if raw:
             values |= {"SENS_BOARD_ROT": 0.0}
         installed = InstalledCalibration(
@@ -162,6 +167,11 @@ class UlogFile(Recording):
         ids = {n: self._log.parameters.get(f"CAL_{triad}{n}_ID") for n in range(4)}
         slots = [n for n, value in ids.items() if value and value == identifier]
         return slots[0] if slots else None
+
+    def _has_slots(self, triad: str) -> bool:
+        """Whether the log says of which sensors its sets of parameters are."""
+        names = (f"CAL_{triad}{n}_ID" for n in range(4))
+        return any(self._log.parameters.get(name) for name in names)
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of a sensor, a piece of the log at a time."""

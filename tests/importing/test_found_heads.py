@@ -109,6 +109,25 @@ def for_people() -> str:
     )
 
 
+def quaternions(head: str, *columns: Array) -> str:
+    """The quaternion of each turn, whose x y z are sin(angle / 2), behind a time."""
+    angle = np.linalg.norm(W, axis=1, keepdims=True) / 50
+    turn = np.column_stack([np.cos(angle / 2), np.sin(angle / 2) * W * 0.02 / angle])
+    head = f"PacketCounter,SampleTimeFine,{head}"
+    return text(head, np.arange(float(N)), 1e6 * T, turn, *columns)
+
+
+def numbered_columns() -> str:
+    """As loggers of cars write it: each cell in quotes, and no row of 1 to 7."""
+    head = (
+        '"Format","AiM CSV File"\n"Sample Rate","50"\n\n"Time","InlineAcc",'
+        '"LateralAcc","VerticalAcc","RollRate","PitchRate","YawRate"\n"s","g","g",'
+        '"g","deg/s","deg/s","deg/s"\n"1","2","3","4","5","6","7"\n'
+    )
+    rows = text("", T, A / G, DEG).strip().split("\n")
+    return "\n".join([head, *('"' + row.replace(",", '","') + '"' for row in rows)])
+
+
 FORMS: dict[str, tuple[Callable[[], str], bool]] = {
     "clock in columns": (clock_parts, False),
     "a time before each channel": (own_times, False),
@@ -151,6 +170,17 @@ FORMS: dict[str, tuple[Callable[[], str], bool]] = {
         lambda: text("time,Nx,Ny,Nz,p,q,r,phi,theta", T, A / G, DEG, DEG[:, :2] + 9),
         False,
     ),
+    "gains of velocity and quaternions of turns": (
+        lambda: quaternions("dq_W,dq_X,dq_Y,dq_Z,dv[1],dv[2],dv[3]", A * 0.02),
+        False,
+    ),
+    "forces and numbered quaternions of turns": (
+        lambda: quaternions(
+            "OriInc_q0,OriInc_q1,OriInc_q2,OriInc_q3,Acc_X,Acc_Y,Acc_Z", A
+        ),
+        False,
+    ),
+    "numbers of the columns above the rows": (numbered_columns, False),
     "codes behind a legend": (behind_a_legend, False),
     "codes of Android": (android_codes, False),
     "labels with units": (for_people, False),
@@ -173,7 +203,8 @@ def test_a_head_is_read_as_it_says(tmp_path: Path, name: str) -> None:
     block, _ = read_files([path])
     np.testing.assert_allclose(block.t - block.t[0], T - T[0], atol=2e-6)
     np.testing.assert_allclose(block.acc, A, atol=2e-6)
-    np.testing.assert_allclose(block.gyr, W, atol=2e-6)
+    # of a turn of 2 deg, twice the sine of its half lacks 5e-5 of it
+    np.testing.assert_allclose(block.gyr, W, atol=2e-6, rtol=5e-5)
     assert np.isfinite(block.temperature).all() == warm
     if warm:
         np.testing.assert_allclose(block.temperature, WARM, atol=1e-6)
@@ -330,6 +361,21 @@ def test_columns_that_physics_tells_have_the_units_of_their_names(
     rates = np.rad2deg(block.gyr.mean(axis=0))
     np.testing.assert_allclose(rates, [0.1, -0.2, 0.1], atol=0.01)
     assert [one for one in says if "--gyr-unit deg/s" in one]
+
+
+@pytest.mark.parametrize("gained", [0.02, 1.0])
+def test_half_the_angle_is_told_by_its_name_without_a_turn(
+    tmp_path: Path, gained: float
+) -> None:
+    path, rng = tmp_path / "log.csv", np.random.default_rng(3)
+    acc = [0, 0, G] + rng.normal(0, 0.02, (N, 3))
+    turn = 0.5 * 0.02 * ([0.01, -0.02, 0.01] + rng.normal(0, 2e-3, (N, 3)))
+    force = "dv[1],dv[2],dv[3]" if gained < 1 else "Acc_X,Acc_Y,Acc_Z"
+    head = f"SampleTimeFine,dQ_W,dQ_X,dQ_Y,dQ_Z,{force}"
+    path.write_text(text(head, 1e6 * T, np.ones(N), turn, acc * gained) + "\n")
+    block, _ = read_files([path])
+    np.testing.assert_allclose(block.gyr, 100 * turn, atol=1e-6)
+    np.testing.assert_allclose(block.acc, acc, atol=1e-6)
 
 
 def test_rates_of_names_that_tell_no_unit_are_asked_about(tmp_path: Path) -> None:

@@ -107,6 +107,19 @@ def test_px4_gyroscopes_have_parameters_of_their_own_number(tmp_path: Path) -> N
     assert not list(file_faults(out / "sensor_accel.1"))
 
 
+def test_a_px4_gyroscope_without_parameters_has_none_of_another(tmp_path: Path) -> None:
+    """Set 1 is of a gyroscope that is not in the log."""
+    path, out = tmp_path / "log.ulg", tmp_path / "out"
+    path.write_bytes(ulog({1: imu(1)}, SLOT | {"CAL_GYRO1_ID": 999.0}))
+    assert main(["import", str(path), "-o", str(out)]) == 0
+    told = mark(out, "device")["installed"]
+    assert told["parameters"]["CAL_ACC1_XOFF"] == 0.5
+    assert told["missing"] == [f"CAL_GYRO1_{axis}OFF" for axis in "XYZ"]
+    installed = InstalledCalibration.from_table(told)
+    with pytest.raises(InputError, match="without CAL_GYRO1_XOFF"):
+        installed.parameters_after(np.zeros(3), np.ones(3), np.zeros(3))
+
+
 @pytest.mark.parametrize("stamp", [0.5, 9999.0])
 @pytest.mark.parametrize("sensor", ["acc", "gyr"])
 def test_a_wrong_time_in_a_px4_log_costs_its_own_sample_alone(

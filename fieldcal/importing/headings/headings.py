@@ -15,7 +15,7 @@ from fieldcal.importing.headings.best_columns import NamedColumn, best_columns
 from fieldcal.importing.headings.heading import Column, HeadingMatch
 from fieldcal.importing.headings.numbered_axes import with_lettered_axes
 from fieldcal.importing.headings.repeated_names import with_distinct_names
-from fieldcal.importing.words.heading_units import UNITS
+from fieldcal.importing.words.heading_units import HALF_ANGLE, UNITS
 from fieldcal.importing.words.heading_words import (
     MEAN,
     SCATTER,
@@ -293,6 +293,7 @@ def _match(
     says = (*says, told) if told else says
     axes = [words_in_name(columns[n.number].name) for n in chosen if n.says.axis]
     ros = bool(axes) and all(any({*part} <= {*words} for part in ROS) for words in axes)
-    usual = "rad/s" if ros else ""
+    half = any(n.says.half for n in chosen)
+    usual = HALF_ANGLE if half else "rad/s" if ros else ""
     free = any(n.says.kind == "a" and n.says.weak and not n.says.gain for n in chosen)
     return HeadingMatch(tuple(found), units, name, says, usual, reversed_, free)

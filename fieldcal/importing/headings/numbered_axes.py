@@ -12,6 +12,9 @@ from fieldcal.importing.words.sensor_words import AXES
 _NUMBERED = re.compile(r"(.*\D)[\[(]?([0-3])[\])]?(\s*[\[(][^\d\[\]()]+[\])])?")
 """A name that ends with a number, and maybe a unit."""
 
+_QUATERNION = re.compile(r"(.*[^\W_])[_ .]q([0-3])")
+"""A component of a quaternion by its number: ``OriInc_q1``."""
+
 BEGINS = (0, 1)
 """Number of the first axis."""
 
@@ -23,8 +26,8 @@ def with_lettered_axes(columns: Sequence[Column]) -> list[Column]:
     >>> [column.name for column in with_lettered_axes(three)]
     ['Accel_x [g]', 'Accel_y [g]', 'Accel_z [g]']
     """
-    found = [*columns]
-    numbered = [_NUMBERED.fullmatch(column.name.strip()) for column in columns]
+    found = _with_lettered_turns(columns)
+    numbered = [_NUMBERED.fullmatch(column.name.strip()) for column in found]
     for i in range(len(columns) - 2):
         three = numbered[i : i + 3]
         if not all(three) or _follows(numbered, i - 1) or _follows(numbered, i + 2):
@@ -39,6 +42,24 @@ def with_lettered_axes(columns: Sequence[Column]) -> list[Column]:
         for k, axis in enumerate(AXES):
             name = f"{stem}_{axis}{said[k][1] or ''}"
             found[i + k] = found[i + k]._replace(name=name)
+    return found
+
+
+def _with_lettered_turns(columns: Sequence[Column]) -> list[Column]:
+    """Columns of which the last three of the quaternion of a turn are x, y and z.
+
+    >>> four = [Column("", f"OriInc_q{i}") for i in range(4)]
+    >>> [column.name for column in _with_lettered_turns(four)]
+    ['OriInc_w', 'OriInc_x', 'OriInc_y', 'OriInc_z']
+    """
+    found = []
+    for column in columns:
+        numbered = _QUATERNION.fullmatch(column.name.strip())
+        said = numbered and heading_meaning(f"{numbered[1]}_x", column.unit)
+        if numbered and said and said.half:
+            letter = "wxyz"[int(numbered[2])]
+            column = column._replace(name=f"{numbered[1]}_{letter}")
+        found.append(column)
     return found
 
 

@@ -131,9 +131,17 @@ def first_numbers(lines: Sequence[str], separator: str | None) -> int:
         # one that lacks a cell, as a setting does, is no row by itself
         alike = rows[i + 1 : i + 2] and len(rows[i + 1]) == len(row)
         wide = s is None or len(row) >= width - bool(alike)
-        if numbers > NUMBERS * len(said) and numbers >= min(NARROWEST, width) and wide:
+        enough = numbers > NUMBERS * len(said) and numbers >= min(NARROWEST, width)
+        if enough and wide and not _numbers_columns(said):
             return i
     return len(lines)
+
+
+def _numbers_columns(cells: Sequence[str]) -> bool:
+    """Whether cells number the columns from 1 on, as loggers of cars write it."""
+    return len(cells) > NARROWEST and [*cells] == [
+        str(i + 1) for i in range(len(cells))
+    ]
 
 
 def count_top_lines(
@@ -159,7 +167,8 @@ def count_top_lines(
         bare = separator is None and len(row) > len(use) / 2
         whole = bare or len(row) in (full, width)
         numbers = all(is_number(cell, separator != ",") for cell in said if cell)
-        if whole and any(said) and numbers:
+        counted = _numbers_columns(split_cells(lines[i], separator))
+        if whole and any(said) and numbers and not counted:
             return i
     return -1
 

@@ -13,8 +13,15 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.units.rate_size import STIRS, TIMES, TurnComparison
-from fieldcal.importing.units.scales import GYR_SCALES, USUAL_COUNTS, Scale, gain_scales
+from fieldcal.importing.units.scales import (
+    GYR_SCALES,
+    USUAL_COUNTS,
+    Scale,
+    gain_scales,
+    half_angle_scales,
+)
 from fieldcal.importing.units.unit_answers import unit_options
+from fieldcal.importing.words.heading_units import HALF_ANGLE
 
 MAX_REST_RATE = 0.5
 """Rate, rad/s, that nothing at rest shows: 30 deg/s."""
@@ -42,6 +49,10 @@ DECIMAL = (1.0, 2.0, 5.0)
 RAD, DEG = GYR_SCALES[:2]
 
 
+HALVED = "half the angle since the row before, as their names say"
+"""What x y z of the quaternion of a turn are."""
+
+
 class CalmRateUnit(NamedTuple):
     """Assumed unit of rates, or a question about it.
 
@@ -67,19 +78,23 @@ def guess_unit_of_calm_rates(
     ----------
     gyr : (n, 3) numbers of the file, all known
     turns : by how much gravity would turn, were they rad/s, and does; None: not known
-    step : s, where accelerations are the gain of velocity over it; None where not
+    step : s, over which rates are what was gained: accelerations are the gain of
+        velocity, or names say half the angle; None where not
     usual : unit that rates of such names are in; "" where names tell none
 
     """
     plain = [s for s in (RAD, DEG) if not usual or s.unit == usual] + [RAD, DEG]
-    if step is not None:
+    if step is not None and usual == HALF_ANGLE:
+        plain = [*half_angle_scales(step)]
+    elif step is not None:
         # who writes gains of velocity, writes gains of angle beside them
         plain = [*gain_scales(step, "rad/s"), *gain_scales(step, "deg/s", DEG.size)]
     allowed = [s for s in plain if turns is None or turns.allow(s.size)]
     whole = bool((gyr == np.round(gyr)).all())
     first = plain[0]
     if step is not None and allowed:
-        return CalmRateUnit(allowed[0], "so are the accelerations, and no turn tells")
+        why = HALVED if usual == HALF_ANGLE else "so are the accelerations"
+        return CalmRateUnit(allowed[0], f"{why}, and no turn tells")
     stepped = None if whole else unit_of_steps(gyr)
     if stepped is not None and stepped.scale in allowed:
         return stepped

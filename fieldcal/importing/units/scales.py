@@ -144,6 +144,14 @@ def gain_scales(step: float, unit: str, size: float = 1.0) -> tuple[Scale, ...]:
     return (Scale(size * step, unit, step),)
 
 
+def half_angle_scales(step: float) -> tuple[Scale, ...]:
+    """Scales of half the angle over a step, s: x y z of the quaternion of the turn.
+
+    They are its sine, which lacks a 24th of the square of the angle: 0.05 % of 6 deg.
+    """
+    return gain_scales(step / 2, "rad/s")
+
+
 def rounded_text(number: float, digits: int = 3) -> str:
     """A number rounded to few digits, without an exponent.
 

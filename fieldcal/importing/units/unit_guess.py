@@ -16,7 +16,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.recording import MAX_READING, ReadOptions, Recording
-from fieldcal.importing.units.calm_rates import guess_unit_of_calm_rates
+from fieldcal.importing.units.calm_rates import HALVED, guess_unit_of_calm_rates
 from fieldcal.importing.units.file_times import FIRST_ROWS, settle_time_units
 from fieldcal.importing.units.gravity_size import (
     GravityReading,
@@ -34,6 +34,7 @@ from fieldcal.importing.units.scales import (
     MIN_ROWS_ALONE,
     fitting_scales,
     gain_scales,
+    half_angle_scales,
     rate_scales,
     rounded_text,
 )
@@ -61,6 +62,7 @@ from fieldcal.importing.units.unit_doubts import (
     check_format_units,
     check_one_unit,
 )
+from fieldcal.importing.words.heading_units import HALF_ANGLE
 from fieldcal.session.units import UNSCALED
 
 NO_UNIT = 0.75
@@ -288,7 +290,10 @@ class _Guess:
         known = rate_scales(self.said.acc_unit)
         fits = fitting_scales(reads, known, GYR_OUT[not gravity.round])
         fits = scales_of_decimals(fits, block.gyr)
-        if self._gained:
+        if self._halved:
+            halves = half_angle_scales(self._step)
+            fits = fitting_scales(reads, halves, GYR_OUT[not gravity.round])
+        elif self._gained:
             # who writes gains of velocity, writes gains of angle beside them
             degrees = gain_scales(self._step, "deg/s", 180 / np.pi)
             scales = (*gain_scales(self._step, "rad/s"), *degrees)
@@ -297,6 +302,7 @@ class _Guess:
             # who writes one sensor's registers as they are, writes the other's so too
             fits = counts
         shows = f"as gravity turns, 1 rad/s reads {rounded_text(reads, 4)}"
+        shows = f"{HALVED}; {shows}" if self._halved else shows
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
@@ -314,10 +320,15 @@ class _Guess:
         """Whether accelerations are gains of velocity since the row before."""
         return self.said.acc_lsb != 1 and self.said.acc_lsb == self._step
 
+    @property
+    def _halved(self) -> bool:
+        """Whether rates are half the angle that was gained since the row before."""
+        return bool(self.said.usual == HALF_ANGLE and self._step)
+
     def _calm(self, block: Block, gyr: Array, gravity: GravityReading | None) -> None:
         """Rates of which no turn tells."""
         turns = gravity and compare_turns(block.t, block.acc, block.gyr, gravity)
-        gained = self._step if self._gained else None
+        gained = self._step if self._gained or self._halved else None
         found = guess_unit_of_calm_rates(gyr, turns, gained, self.said.usual)
         if found.scale is None:
             self._ask(found.asks, [*found.answers])

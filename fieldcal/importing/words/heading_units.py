@@ -49,6 +49,9 @@ THERMOMETERS = (*SPELLINGS["K"], *SPELLINGS["deg F"], "°c", "degc", "deg c", "c
                 "℃", "degrees c", "deg.c", "ºc")  # fmt: skip
 """Units that tell a thermometer, whatever it is called: a lone c or ° may be any."""
 
+HALF_ANGLE = "half rad"
+"""What names of rates tell where they are half the angle since the row before."""
+
 _UNIT_BEHIND = re.compile(r"(.*?)[\s_.]*([(\[][^()\[\]]*[)\]]|[^\s_.()\[\]]+)")
 """A name with what may be its unit, in brackets or as the last word."""
 

@@ -32,6 +32,7 @@ from fieldcal.importing.words.sensor_words import (
     SINCE,
     STEPS,
     TIMES,
+    TURNS,
     WITHOUT_GRAVITY,
 )
 from fieldcal.importing.words.sensor_words import TEMPERATURES as THERMOMETER_NAMES
@@ -88,6 +89,7 @@ class HeadingMeaning(NamedTuple):
     label : what else the name says, such as which IMU
     weak : whether something else may be meant
     gain : whether it is what velocity or angle gained since the row before
+    half : whether it is half the angle, as the quaternion of a turn has it
 
     """
 
@@ -97,6 +99,7 @@ class HeadingMeaning(NamedTuple):
     label: tuple[str, ...] = ()
     weak: bool = False
     gain: bool = False
+    half: bool = False
 
 
 def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
@@ -109,7 +112,7 @@ def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
 
     >>> heading_meaning("imu1_GyroX (dps)")
     HeadingMeaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), \
-weak=False, gain=False)
+weak=False, gain=False, half=False)
     """
     if len(name) > LONGEST:
         return None
@@ -165,6 +168,11 @@ def _kind_of(unit: str | None) -> str:
 def _meaning_of_words(words: list[str], unit: str | None) -> HeadingMeaning | None:
     if not words:
         return None
+    for name in TURNS:
+        if (at := _find_phrase(words, name)) is not None:
+            rest = words[:at] + words[at + len(name) :]
+            turn = _with_axis("g", rest, unit, weak=True)
+            return turn and turn._replace(gain=True, half=True)
     words = with_axis_letter(words, unit in UNITS["g"])
     if unit in TEMPERATURES and {*words} & {"t", *THERMOMETER_NAMES}:
         label = tuple(w for w in words if w not in ("t", *THERMOMETER_NAMES))

@@ -51,9 +51,15 @@ GAINS = (
     (("delta", "theta"), "g"),
     (("delta", "velocity"), "a"),
     (("delta", "vel"), "a"),
+    (("vel", "inc"), "a"),
     (("dv",), "a"),
+    (("d", "v"), "a"),
 )
 """Names of what angle and velocity gained since the row before."""
+
+TURNS = (("ori", "inc"), ("dq",), ("d", "q"))
+"""Names of the quaternion of the turn since the row before, of which x y z are half the
+angle about each axis: those of Xsens and Movella."""
 
 TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "sensortime",
          "epoch", "epoc", "unixtime", "datetime", "zeit", "zeitstempel", "tiempo",

@@ -219,6 +219,9 @@ class Experience:
             changes.get(name, getattr(self, name))
             for name in ("alpha", "beta", "base_force", "base_rate")
         )
+        known = np.isfinite(alpha + beta)[:, None]
+        if not known.any():
+            return replace(self, **changes)
         gamma = changes.get("gamma", self.gamma)
         third = gamma if gamma.any() else None
         force = in_procedure_axes(alpha, beta, base_force, third) @ self.mounting
@@ -226,7 +229,6 @@ class Experience:
         if self.rate.any():
             table = self.rate @ self.mounting
             earth = table + (axis_projections(table) @ earth[:, :, None])[:, :, 0]
-        known = np.isfinite(alpha + beta)[:, None]
         made = {
             "f": np.where(known, force, changes.get("f", self.f)),
             "w": np.where(known, earth, self.w),

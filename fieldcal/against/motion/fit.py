@@ -57,6 +57,7 @@ class MotionFit:
     ----------
     levels : ln of the noise's power in each band, by channel
     state, values : at the estimate that was settled last, and (k,) of its columns
+    settled_keys : of the causes that were settled last
 
     """
 
@@ -67,6 +68,7 @@ class MotionFit:
         self.levels: dict[int, Array] = {}
         self.state = nominal
         self.values: Array = np.zeros(system.dictionary.width)
+        self.settled_keys = frozenset[str]()
         self._finest = FINEST**2 * np.mean(np.nan_to_num(system.motion.y) ** 2, axis=0)
 
     @property
@@ -120,6 +122,7 @@ class MotionFit:
             if step < STAYS and change < STEADY:
                 break
         self.state, self.values = state, values
+        self.settled_keys = frozenset(c.key for c, _ in members)
 
     def _weigh(self, linear: Sequence[LinearRows], values: Array, found: Set) -> None:
         """Set the noise of the rows to that of a fit's residuals."""

@@ -32,7 +32,6 @@ from fieldcal.model.rows.motion import (
     rows_in_motion,
 )
 from fieldcal.model.rows.reference import Reference
-from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.search.variations import ALTERNATIVE_MARGIN
 from fieldcal.model.state import State
 from fieldcal.model.system.motion_rows import MotionSystem
@@ -104,12 +103,11 @@ def _explained(fit: MotionFit) -> MotionExplanation:
     """Search from a fit, and repeat both with the causes found."""
     found = fit.search(())
     for _ in range(MAX_SEARCHES):
-        before, members = found.best.keys, found.best.members
-        fit.settle(members)
+        fit.settle(found.best.members)
+        fit, members = _without_idle_lags(fit, found.best.members)
         found = fit.search(members)
-        if found.best.keys == before:
+        if found.best.keys == fit.settled_keys:
             break
-    fit, found = _without_idle_lags(fit, found)
     evidence = fit.evidence(found.best.members)
     return MotionExplanation(fit, found, Posterior(found.search, found.best), evidence)
 
@@ -152,27 +150,23 @@ def _likely_starts(fit: MotionFit, dictionary: MotionDictionary) -> list[_Start]
 
 
 def _without_idle_lags(
-    fit: MotionFit, found: InferenceResult
-) -> tuple[MotionFit, InferenceResult]:
+    fit: MotionFit, members: tuple[Member, ...]
+) -> tuple[MotionFit, tuple[Member, ...]]:
     """Remove filters and delays without which a new fit is at least as likely.
 
     Linearised about a filter, its absence looks worse than it is, since its effect is
-    proportional to the square or cube of its time constant.
+    proportional to the square or cube of its time constant. `members` are settled.
     """
     most: float | None = None
-    for member in [m for m in found.best.members if lag_of(m) != Lag()]:
-        if member[0].key not in found.best.keys:
-            continue
+    for member in [m for m in members if lag_of(m) != Lag()]:
         if most is None:
-            full = fit.copy()
-            full.settle(found.best.members)
-            most = full.evidence(found.best.members)
-        others = tuple(m for m in found.best.members if m[0].key != member[0].key)
+            most = fit.evidence(members)
+        others = tuple(m for m in members if m[0].key != member[0].key)
         lean = fit.copy()
         lean.settle(others)
-        if lean.evidence(others) >= most:
-            fit, found, most = lean, lean.search(others), None
-    return fit, found
+        if (left := lean.evidence(others)) >= most:
+            fit, members, most = lean, others, left
+    return fit, members
 
 
 def _motion_rows(block: Block, reference: Reference, start: Alignment) -> MotionRows:

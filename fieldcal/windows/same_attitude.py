@@ -39,8 +39,8 @@ from math import comb, log
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
+from fieldcal.core.running_integral import running_integral
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows.cells import (
     CELL,
@@ -190,7 +190,7 @@ def _turn_in_gap(
     if len(way) < 2 or not np.isfinite(way.gyr).all():
         return nothing, nothing, np.nan
     rate = way.gyr - level
-    angle = cumulative_trapezoid(rate, way.t, axis=0)
+    angle = running_integral(way.t, rate)
     most = float(np.linalg.norm(angle, axis=1).max())
     order = min(DIFFERENCE_ORDER, len(rate) - 1)
     quick = np.diff(rate, order, axis=0) ** 2 / comb(2 * order, order)

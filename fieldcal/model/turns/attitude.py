@@ -10,10 +10,10 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
 from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross
+from fieldcal.core.running_integral import running_integral
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
@@ -28,7 +28,7 @@ were clipped, or that the device was turned otherwise than its positions say."""
 
 def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
     """Means (k, ...) between indices cut (k + 1,) of values (n, ...) at instants t."""
-    total = cumulative_trapezoid(values, t, axis=0, initial=0)
+    total = running_integral(t, values)
     length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
     mean: Array = np.diff(total[cut], axis=0) / length
     return mean

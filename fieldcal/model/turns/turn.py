@@ -23,10 +23,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross
+from fieldcal.core.running_integral import running_integral
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.turns.attitude import (
     trapezoid_means,
@@ -118,7 +118,7 @@ class Turn:
         `rate_error` (m + 1, 3, k) are k courses of rate errors dW / s, rad/s.
         """
         at_start = np.einsum("mji,mjk->mik", self.attitude, rate_error)  # axes of p
-        phi = cumulative_trapezoid(at_start, self.x.t, axis=0, initial=0)
+        phi = running_integral(self.x.t, at_start)
         out: Array = phi - self.done[:, None, None] * phi[-1]
         return out
 

@@ -378,6 +378,21 @@ def test_half_the_angle_is_told_by_its_name_without_a_turn(
     np.testing.assert_allclose(block.acc, acc, atol=1e-6)
 
 
+@pytest.mark.parametrize(("tick", "said"), [(0.79, True), (1.0, False)])
+def test_a_timer_that_counts_no_us_is_told_by_the_turns(
+    tmp_path: Path, tick: float, said: bool
+) -> None:
+    """The 16-bit timer of Crossbow's units counts 0.79 us."""
+    path = tmp_path / "log.csv"
+    counts = np.round(T / tick * 1e6) % 65536
+    head = "time,ax (g),ay (g),az (g),gx (deg/s),gy (deg/s),gz (deg/s)"
+    path.write_text(text(head, counts, A / G, DEG) + "\n")
+    _, says = read_files([path])
+    told = [one for one in says if "nothing says the unit of its times" in one]
+    assert len(told) == said
+    assert all("rates are 1.2" in one and "--rate (about " in one for one in told)
+
+
 def test_rates_of_names_that_tell_no_unit_are_asked_about(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(still("time,Nx,Ny,Nz,p,q,r", 0.12) + "\n")

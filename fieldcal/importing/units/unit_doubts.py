@@ -20,6 +20,10 @@ from fieldcal.session.units import UNSCALED
 MAX_LOG_SCALE = 0.25
 """Logarithm of what no sensor in the unit that is said is out by."""
 
+FACTORY_SCALE = 0.15
+"""Logarithm of what rates in a known unit are out by: their scale factor by a
+twentieth, and the turns of a hand, by which it is seen, by a tenth."""
+
 OTHER_UNIT = 3.0
 """Ratio of what gravity reads in two files from which their units differ: those of
 m/s^2 and g by ten, and what biases make of it by less than two."""
@@ -155,13 +159,28 @@ class StatedUnits:
             odd = self._columns.doubts(block.t, block.acc, block.gyr, gravity)
             return odd or self._of_calm(block, gravity)
         if abs(np.log(turned)) <= MAX_LOG_SCALE:
-            return []
+            return self._of_ticks(block, turned)
         fits = _within(turned / self._said.gyr_scale, GYR_SCALES)
         shows = f"rates are {turned:.4g} times those at which gravity turns"
         other = (
             self._said.rate_hz and f"--rate {rounded_text(self._said.rate_hz * turned)}"
         )
         return self._contradict("g", shows, "--gyr-unit", fits, other or "")
+
+    def _of_ticks(self, block: Block, turned: float) -> list[str]:
+        """Times of a guessed unit in which rates are out by more than a factory leaves.
+
+        A timer counts what its processor divides, such as 0.79 us, and is near a unit.
+        """
+        if "time" not in self._guessed or abs(np.log(turned)) <= FACTORY_SCALE:
+            return []
+        steps = np.diff(block.t)
+        rate = turned / float(np.median(steps[steps > 0]))
+        return [
+            f"rates are {turned:.3g} times those at which gravity turns, and nothing"
+            f" says the unit of its times: if one is no {self._said.time_unit}, name"
+            f" their column _ in --columns and give --rate (about {rounded_text(rate)})"
+        ]
 
     def _of_calm(self, block: Block, gravity: GravityReading) -> list[str]:
         """Rates by which gravity would turn where it does not."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
@@ -49,7 +49,7 @@ class Refinement:
             members = self.refine_shape(members, together)
             done |= {*together}
         for _, group in members:
-            self._add_to_other_triad(group, {c.key for c, _ in members})
+            self._add_to_others(group, {c.key for c, _ in members})
         return members
 
     def refine_shape(
@@ -80,16 +80,20 @@ class Refinement:
             members = self._at_parabola_top(at, members, first, scores)
         return members
 
-    def _add_to_other_triad(self, group: Group, present: set[str]) -> None:
-        """Add variants at the same instant to an effect's cause on the other triad.
+    def _add_to_others(self, group: Group, present: set[str]) -> None:
+        """Add variants at a member's instant to other causes that begin at one.
 
-        Causes whose keys are `present` in the set already have them.
+        What happened then may be of another kind, or on the other triad too; where the
+        grid has no instant as near, the rows would seem to tell them apart. Causes
+        whose keys are `present` in the set already have them.
         """
+        if not group.begins_at_instant:
+            return
+        (at,) = group.shape.values()
         for cause in self.fit.dictionary.causes:
             if cause.key not in present:
-                for variant in cause.simultaneous_variants(group):
-                    at = [*group.shape.values()]
-                    cause, _ = self.fit.variants_near(cause, variant, at)
+                for variant in _nearest_by_parameters(cause, at):
+                    cause, _ = self.fit.variants_near(cause, variant, [at])
 
     def _trial_sets(
         self,
@@ -132,3 +136,10 @@ class Refinement:
         variants = tuple(refined if g is group else g for g in cause.variants)
         cause = self.fit.dictionary.replace_variants(cause, variants)
         return (*best[:i], (cause, refined), *best[i + 1 :])
+
+
+def _nearest_by_parameters(cause: Cause, at: float) -> list[Group]:
+    """The variants that begin nearest to an instant, with each choice of parameters."""
+    begin = [g for g in cause.variants if g.begins_at_instant]
+    begin.sort(key=lambda g: -abs(next(iter(g.shape.values())) - at))
+    return list({g.params: g for g in begin}.values())

@@ -207,6 +207,28 @@ def test_the_top_of_a_parabola_is_where_it_is() -> None:
     assert group.shape["tau_s"] == pytest.approx(at * FINEST), "no further than a step"
 
 
+def test_what_begins_at_a_refined_instant_may_be_of_any_kind() -> None:
+    """A jump of a bias in the last position is a knock at the base too, as exactly."""
+    x = ladder(6)
+    d = dictionary(x)
+    cause = next(c for c in d.causes if c.key == "bias_step:acc")
+    here = next(g for g in cause.variants if g.params == (1,))
+    later = x.t > x.t[x.position == 8].mean()
+    y = np.hstack([x.f, x.w])
+    y[later, 1] += 0.03
+    fit = GaussNewton(WindowSystem(rows_of(x, y), d), nominal())
+    none = np.zeros(d.width)
+    _, _, found = fit.settle(nominal(), none, ((cause, here),))
+    refinement = Refinement(fit, nominal(), none, found.sizes)
+    ((_, refined),) = refinement.refine_shapes(((cause, here),))
+    at = refined.shape["at_s"]
+    assert at not in {g.shape["at_s"] for g in cause.variants}
+    for key in ("bias_step:gyr", "base_step", "mount_slip"):
+        other = next(c for c in d.causes if c.key == key)
+        then = {g.params for g in other.variants if g.shape["at_s"] == at}
+        assert then == {g.params for g in other.variants}, key
+
+
 # --- two at a time
 
 KEYS = ("angle_offset", "quadratic", "g_sensitivity", "bias_drift:acc",

@@ -133,3 +133,28 @@ def test_a_planned_window_is_the_first_of_the_ladder_that_is_good_enough() -> No
         assert needed_seconds(waves) == expected
         planned.add(expected)
     assert planned == {10, 15, 20, 30, 45, 60, 90, 120, 180, 300, 600}
+
+
+@pytest.mark.parametrize("middle", [0.04, 0.05])
+def test_the_wave_that_needs_the_next_window_is_known_to_a_hundredth(
+    middle: float,
+) -> None:
+    """Where a larger wave first needs a longer window, found by halving."""
+    rng, hz = np.random.default_rng(6), middle * np.array([0.9, 1.0, 1.15])
+    cos, sin = rng.standard_normal((2, 3, 6))
+    noise = np.repeat([1e-5, 1e-6], 3)
+
+    def waves(size: float) -> SwayWaves:
+        return waves_of(hz, size * cos, size * sin, noise)
+
+    small, large = 1e-6, 1.0
+    shortest = seconds_by_hand(waves(small), 6)
+    assert seconds_by_hand(waves(large), 6) > shortest
+    while large > 1.005 * small:
+        size = np.sqrt(small * large)
+        if seconds_by_hand(waves(size), 6) > shortest:
+            large = size
+        else:
+            small = size
+    assert needed_seconds(waves(small)) == shortest
+    assert needed_seconds(waves(large)) == seconds_by_hand(waves(large), 6)

@@ -14,6 +14,7 @@ from laid_about import G, turned, write
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
 from fieldcal.session.folder import Session
+from fieldcal.windows import jumps as jump_module
 from fieldcal.windows.jumps import JumpFinder
 
 HZ, NOISE = 50.0, 0.012
@@ -184,3 +185,17 @@ def test_a_log_of_rests_without_times_needs_no_more_than_its_rate(
     path = write(tmp_path, timed, "timed.csv", "t (s),ax,ay,az")
     assert main(["import", str(path), "-o", str(tmp_path / "timed")]) == 0
     assert "only its rests" not in capsys.readouterr().err
+
+
+def test_the_noise_of_a_row_is_that_of_its_steps_and_at_least_a_step() -> None:
+    """The least step that is one; without any, the noise is none."""
+    deviation = np.random.default_rng(3).normal(0, [0.1, 0.2, 0.3], (40_001, 3))
+    white = np.abs(np.diff(deviation, axis=0))
+    np.testing.assert_allclose(jump_module._noise(white), [0.1, 0.2, 0.3], rtol=0.03)
+    coarse = np.array([[0.0, 0.4, 0.0], [0.5, 0.0, 0.0], [1.5, 0.0, 0.0], [0, 0.2, 0]])
+    np.testing.assert_array_equal(jump_module._least_jump(coarse), [0.5, 0.2, np.inf])
+    # medians: a quarter, a tenth and nothing
+    usual = np.array([0.25, 0.1, 0.0]) * 1.4826 / np.sqrt(2)
+    least = np.maximum(usual, [0.5, 0.2, 0.0])
+    np.testing.assert_allclose(jump_module._noise(coarse), least, rtol=1e-4)
+    assert np.isnan(jump_module._noise(coarse[:0])).all()

@@ -216,3 +216,44 @@ def test_times_in_another_unit_take_no_memory(unit: float) -> None:
     t = np.arange(2000) / 100.0
     six = np.random.default_rng(1).normal(0.0, 1e-3, (2000, 6)) + [0, 0, 9.8, 0, 0, 0]
     assert find_sway(t * unit, six, np.ones(3)) == []
+
+
+@pytest.mark.parametrize(
+    ("seconds", "parts"), [(40.0, 1), (40.02, 2), (80.0, 2), (80.02, 3)]
+)
+def test_a_window_is_divided_from_its_first_sample_to_its_last(
+    monkeypatch: pytest.MonkeyPatch, seconds: float, parts: int
+) -> None:
+    """One sample more than forty seconds is two stretches, of the samples in order."""
+    seen: list[Array] = []
+
+    def stretch(t: Array, six: Array, scale: Array) -> None:
+        np.testing.assert_array_equal(six[:, 4], 3 * t)
+        seen.append(t)
+
+    monkeypatch.setattr(sway, "_waves_of_stretch", stretch)
+    t = np.append(np.arange(0.0, seconds - 0.015, 0.02), seconds)
+    six = np.outer(t, [1.0, 0.0, 0.0, 0.0, 3.0, 0.0])
+    assert find_sway(t, six, PLAIN) == []
+    assert len(seen) == parts
+    np.testing.assert_array_equal(np.concatenate(seen), t)
+
+
+def test_cells_are_means_of_whole_tenths_of_a_second() -> None:
+    """None across a gap, and none of samples that are left over."""
+    t = 7.0 + np.arange(253) / 50
+    t[111:] += 0.5
+    six = np.outer(t, np.arange(1.0, 7.0))
+    found = sway._cells(t, six)
+    assert found is not None
+    at, y, length = found
+    parts = [t[i : i + 5].mean() for i in range(0, 250, 5) if i != 110]
+    np.testing.assert_allclose(at, parts)
+    np.testing.assert_allclose(y, np.outer(parts, np.arange(1.0, 7.0)))
+    assert length == pytest.approx(0.1)
+    assert sway._cells(t[:79], six[:79]) is None  # fifteen cells
+    few = sway._cells(t[:80], six[:80])
+    assert few is not None and len(few[0]) == 16
+    rare = sway._cells(3 * np.arange(16.0), np.zeros((16, 6)))
+    assert rare is not None and len(rare[0]) == 16 and rare[2] == 3.0
+    assert sway._cells(3 * np.arange(15.0), np.zeros((15, 6))) is None

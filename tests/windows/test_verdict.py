@@ -7,6 +7,7 @@ import pytest
 
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows import StillnessLimits, average
+from fieldcal.windows import verdict as verdict_module
 from fieldcal.windows.cells import CellAccumulator, CellTable
 from fieldcal.windows.disturbance import LeastSpread, pushes, shakes, steps
 from fieldcal.windows.quiet import QuietNoise, estimate_quiet_noise
@@ -337,3 +338,24 @@ def test_a_gyroscope_is_turned_and_an_accelerometer_pushed(
 ) -> None:
     departure = Departure(4.0, "push", channel, 12.0, 0.6, 0.5, 0.01)
     assert departure._push("5") == what
+
+
+def test_lines_go_through_means_with_the_step_of_a_mean(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A mean of ten values that are whole steps is a whole tenth of a step."""
+    seen: list[Array | None] = []
+
+    def lines(means: Array, step: Array | None = None) -> Array:
+        seen.append(step)
+        return robust_lines(means, step)
+
+    monkeypatch.setattr(verdict_module, "robust_lines", lines)
+    step = np.repeat([0.05, 0.004], 3)
+    block = block_of(rest(), start=100.0)
+    coarse = np.round(block.six / step) * step
+    coarse[:, 3:] = step[3:]  # which never changes
+    judge_window(table(Block.of(block.t, coarse[:, :3], coarse[:, 3:])), LIMITS)
+    (found,) = seen
+    assert found is not None
+    np.testing.assert_allclose(found, np.repeat([0.005, 0.0], 3), atol=1e-12)

@@ -133,3 +133,23 @@ def test_what_does_not_move_is_off_by_the_same_in_every_window() -> None:
                          rates)  # fmt: skip
         alike = shared_rounding_sigma(block, windows, sigma)[3:]
         assert (alike > least).all() and (alike < 0.0201).all()
+
+
+def test_windows_share_what_the_usual_noise_leaves_and_not_the_largest() -> None:
+    """Of values without noise the covariance over a step v apart is a parabola.
+
+    One of five windows has noise of a step; what is usual has none.
+    """
+    step, n = 0.5, 1000
+    rng = np.random.default_rng(5)
+    gyr = np.zeros((5 * n, 3)) + step * np.array([1.0, -2.0, 3.0])
+    gyr[:n] += step * np.round(rng.standard_normal((n, 3)) + [0.0, 0.2, 0.4])
+    block = Block.of(np.arange(5 * n) / RATE, rng.standard_normal((5 * n, 3)), gyr)
+    windows = (np.arange(0, 5 * n, n)[:, None] + [0, n]).astype(np.intp)
+    off = np.full((5, 6), 0.1) * np.array([[1.0], [2.0], [3.0], [4.0], [5.0]])
+    apart = (gyr[:n].mean(axis=0) - gyr[n]) / step % 1.0
+    one = 6 * (apart**2 - apart + 1 / 6)  # in units of q^2 / 12
+    share = (4 * one + 6 * 1.0) / 10  # of ten pairs, six of windows alike
+    found = shared_rounding_sigma(block, windows, off)
+    expected = np.sqrt(share * np.mean(off[:, 0] ** 2))
+    np.testing.assert_allclose(found, [0.0, 0.0, 0.0, *expected], rtol=1e-6)

@@ -1,25 +1,52 @@
 """Sessions of the virtual device, and what the state that was found leaves of them."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from small_sessions import Session as SmallSession
+from small_sessions import ladder
 
 from benchmarks.concealed import kinds
 from benchmarks.concealed.draws import sized
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
+from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
+from fieldcal.model.state import State
 from fieldcal.model.system.fitted import estimates_by_column
 
 FADING = {
     "warm_up": {"ax": 0.01, "ay": 0.004, "az": -0.008, "tau_s": 143.0},
     "settling": {"ax": 0.01, "ay": 0.004, "az": -0.008, "tau_s": 6.1},
 }
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_rows_are_linearised_with_the_set_that_is_known(known: bool) -> None:
+    """Forces during turns are used beside a set that the windows were fitted to."""
+    small = SmallSession.of(ladder(), ("bias_drift:acc",))
+    made = small.search(small.noise(np.random.default_rng(1))).sets
+    there = made.evaluate(()) if known else None
+    asked: list[Any] = []
+
+    class Rows:
+        dictionary = made.dictionary
+
+        def gram(self, *about: Any) -> Gram:
+            asked.append(about)
+            return made.gram
+
+    state, values = cast(State, object()), np.zeros(2)
+    search = Inference(cast(GaussNewton, Rows()))._search_about(state, values, there)
+    ((about, at, held),) = asked
+    assert about is state and at is values and held is there
+    assert search.sets.gram is made.gram
 
 
 @pytest.mark.thorough

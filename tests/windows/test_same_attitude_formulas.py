@@ -1,0 +1,227 @@
+"""Formulas of `same_attitude`, each by other means than its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.windows import same_attitude
+from fieldcal.windows.cells import CellTable
+from fieldcal.windows.quiet import estimate_quiet_noise
+from fieldcal.windows.same_attitude import probability_unmoved
+
+FORCE = np.array([2.0, -5.0, 8.0])
+SPREAD = np.array([1e-3, 2e-3, 3e-3]) ** 2
+UNSURE = np.array([3e-4, 2e-4, 4e-4]) ** 2
+NOTHING = np.full(3, np.nan)
+STILL = (np.zeros(3), UNSURE, 0.0)
+NO_CELLS = CellTable(np.zeros(0), np.zeros((0, 34)), np.zeros(6))
+WAY = Block.of(np.arange(20) / 50, FORCE + np.zeros((20, 3)))
+
+
+class Unmoved:
+    """The probability, where what is measured is given."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.patch = patch
+
+    def __call__(
+        self,
+        change: Array,
+        turn: tuple[Array, Array, float] = STILL,
+        spread: Array = SPREAD,
+        way: Block = WAY,
+    ) -> float:
+        rates = np.full(3, 7.0)  # read by `_turn_in_gap` alone
+        means = tuple(np.append(part, rates) for part in (FORCE, change, spread))
+
+        def compared(before: CellTable, after: CellTable, gap: float) -> object:
+            assert gap == 1.0
+            return means
+
+        self.patch.setattr(same_attitude, "_compare_means", compared)
+        self.patch.setattr(same_attitude, "_turn_in_gap", lambda *_: turn)
+        return probability_unmoved(NO_CELLS, way, NO_CELLS, (-0.25, 0.75))
+
+
+@pytest.fixture
+def unmoved(monkeypatch: pytest.MonkeyPatch) -> Unmoved:
+    return Unmoved(monkeypatch)
+
+
+def by_bayes(change: Array, turned: Array, spread: Array, unsure: Array) -> float:
+    """Sum over the four cases; outputs with nan are left out."""
+    measured, variance = np.append(change, turned), np.append(spread, unsure)
+    some = np.isfinite(measured)
+    chances = []
+    for turns in (False, True):
+        chance = 0.0
+        for jumps in (False, True):
+            cov = np.diag(np.where(some, variance, 1.0))
+            if turns:
+                for axis in np.eye(3):
+                    one = 5e-3 * np.append(np.cross(FORCE, axis), axis)
+                    cov += np.outer(one, one)
+            if jumps:
+                cov[[0, 1, 2], [0, 1, 2]] += 0.05**2
+            density = multivariate_normal(cov=cov[np.ix_(some, some)])
+            chance += (0.01 if jumps else 0.99) * density.pdf(measured[some])
+        chances.append(chance)
+    return float(chances[0] / sum(chances))
+
+
+@pytest.mark.parametrize(
+    ("change", "turned"),
+    [
+        ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+        ([4e-3, 1e-3, -2e-3], [6e-4, -3e-4, 0.0]),
+        ([0.05, -0.03, 0.02], [1e-4, 2e-4, 0.0]),  # a jump, or nothing
+        ([0.05, 0.02, 0.0], [4e-4, -2e-4, 1e-3]),
+        ([-0.012, 6e-3, 5e-3], [0.0, -1e-3, 0.0]),
+        ([-1e-3, 8e-4, 5e-4], NOTHING),  # the force alone
+        ([-5e-3, 3e-3, 2e-3], NOTHING),
+        (NOTHING, [6e-4, -3e-4, 8e-4]),  # the gyroscopes alone
+    ],
+)
+def test_the_probability_is_that_of_four_cases(
+    unmoved: Unmoved, change: list[float], turned: list[float]
+) -> None:
+    d, phi = np.array(change), np.array(turned)
+    unsure = np.where(np.isfinite(phi), UNSURE, np.nan)
+    most = float(np.linalg.norm(phi))
+    expected = by_bayes(d, phi, SPREAD, UNSURE)
+    assert 1e-4 < expected < 1
+    found = unmoved(d, (phi, unsure, most))
+    assert found / (1 - found) == pytest.approx(expected / (1 - expected), rel=1e-6)
+
+
+def test_one_axis_by_hand(unmoved: Unmoved) -> None:
+    """A gyroscope's angle alone: the ratio of two normal densities, by quadrature."""
+    phi, sigma = 1.2e-3, 3e-4
+    turn = (np.array([phi, 0.0, 0.0]), np.array([sigma**2, 1e8, 1e8]), phi)
+
+    def density(theta: float) -> float:
+        return float(np.exp(-(((phi - theta) / sigma) ** 2 + (theta / 5e-3) ** 2) / 2))
+
+    moved = quad(density, -0.02, 0.02, points=[phi])[0] / 5e-3 / np.sqrt(2 * np.pi)
+    odds = np.exp(-((phi / sigma) ** 2) / 2) / moved
+    found = unmoved(NOTHING, turn)
+    assert found / (1 - found) == pytest.approx(odds, rel=1e-6)
+
+
+def test_an_accelerometer_that_is_missing_takes_the_others_with_it(
+    unmoved: Unmoved,
+) -> None:
+    """The cross product needs all three; a gyroscope is one by itself."""
+    phi = np.array([6e-4, -3e-4, 8e-4])
+    expected = by_bayes(NOTHING, phi, SPREAD, UNSURE)
+    some = np.array([0.0, np.nan, 0.0])
+    assert unmoved(some, (phi, UNSURE, 0.0)) == pytest.approx(expected)
+    frozen = np.array([0.0, *SPREAD[1:]])  # no noise, and so no weight
+    assert unmoved(np.zeros(3), (phi, UNSURE, 0.0), frozen) == pytest.approx(expected)
+    two = np.array([np.nan, -3e-4, 8e-4])
+    with_force = by_bayes(np.zeros(3), two, SPREAD, UNSURE)
+    assert unmoved(np.zeros(3), (two, UNSURE, 0.0)) == pytest.approx(with_force)
+    unsure = np.array([np.nan, *UNSURE[1:]])
+    assert unmoved(np.zeros(3), (two, unsure, 0.0)) == pytest.approx(with_force)
+    assert unmoved(some, (two, UNSURE, 0.0)) == 0.0, "nothing tells a turn about x"
+
+
+def test_more_than_a_tenth_of_a_radian_is_elsewhere(unmoved: Unmoved) -> None:
+    """By the gyroscopes on the way, or by the force from before to after."""
+    size, wide = float(np.linalg.norm(FORCE)), np.full(3, 4.0)
+    along = FORCE / size
+    for angle, there in ((0.095, True), (0.105, False)):
+        assert (unmoved(np.zeros(3), (np.zeros(3), UNSURE, angle)) > 0) == there
+        assert (unmoved(angle * size * along, STILL, wide) > 0) == there
+        away = Block.of(WAY.t, WAY.acc + angle * size * along)
+        nobody = (NOTHING, NOTHING, np.nan)
+        assert (unmoved(np.zeros(3), nobody, wide, away) > 0) == there
+        # gyroscopes that work say so themselves
+        assert unmoved(np.zeros(3), STILL, wide, away) > 0
+    assert unmoved(NOTHING, (NOTHING, NOTHING, np.nan), SPREAD, WAY[:0]) == 0.0
+
+
+def cells(means: Array, origin: Array, times: Array, step: float = 1e-6) -> CellTable:
+    """Cells of ten samples each; `means` (m, 6) less the origin."""
+    sums = np.zeros((len(means), 34))
+    sums[:, :6], sums[:, 18:24] = 10.0, 9.0
+    sums[:, 6:12] = 10.0 * means
+    sums[:, 12:18] = 9.0 * 2 * 1e-4**2  # noise of samples: 1e-4
+    sums[:, 26:32] = step
+    return CellTable(times, sums, origin)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "levels", "drift", "walk", "steps"),
+    [
+        (90, 70, 8, 0.0, 0.2, (0.0, 0.0)),
+        (70, 90, 8, 2e-4, 0.2, (0.02, 0.01)),
+        (40, 1300, 8, 1e-3, 0.2, (0.01, 0.02)),
+        (1300, 40, 8, 0.0, 0.0, (0.0, 0.0)),
+        (2400, 2400, 8, 1e-5, 0.0, (0.0, 0.03)),
+        (4100, 4100, 10, 0.0, 0.0, (0.0, 0.0)),
+    ],
+)
+def test_means_are_compared_over_the_best_time(
+    left: int,
+    right: int,
+    levels: int,
+    drift: float,
+    walk: float,
+    steps: tuple[float, float],
+) -> None:
+    """One after another, of lines by least squares."""
+    rng, gap, origin = np.random.default_rng(left), 1.7, np.arange(6.0)
+    times = np.r_[np.arange(left) * 0.1, gap + np.arange(left, left + right) * 0.1]
+    sizes = np.geomspace(1e-3, 1e-2, 6)
+    y = sizes * rng.standard_normal((left + right, 6)) + drift * times[:, None]
+    y += walk * sizes * np.cumsum(rng.standard_normal(y.shape), axis=0)
+    before = cells(y[:left], origin, times[:left], steps[0])
+    after = cells(y[left:], origin, times[left:], steps[1])
+    allan = estimate_quiet_noise(y, levels=levels).allan
+    least = np.full(6, np.inf)
+    level, change = np.zeros(6), np.zeros(6)
+    for k in range(len(allan)):
+        n = 2**k
+        if n > min(left, right):
+            break
+        parts = [(times[:left][-4 * n :], y[:left][-4 * n :]),
+                 (times[left:][: 4 * n], y[left:][: 4 * n])]  # fmt: skip
+        slope = np.mean(
+            [np.polyfit(t - t[0], p, 1)[0] if len(t) > 1 else 0 for t, p in parts],
+            axis=0,
+        )
+        r = 1 + gap / (0.1 * n)
+        b = (r + 1) ** 2 * np.log(r + 1) + (r - 1) ** 2 * np.log(r - 1)
+        b = (b - 2 * r**2 * np.log(r)) / np.log(16)
+        variance = 2 * b * allan[k] ** 2 + (slope * (gap + 0.1 * n)) ** 2
+        one, other = y[left - n : left].mean(axis=0), y[left : left + n].mean(axis=0)
+        better = variance < least
+        least = np.where(better, variance, least)
+        level = np.where(better, origin + (one + other) / 2, level)
+        change = np.where(better, other - one, change)
+    found = same_attitude._compare_means(before, after, gap)
+    np.testing.assert_allclose(found[0], level)
+    np.testing.assert_allclose(found[1], change)
+    np.testing.assert_allclose(found[2], least + max(steps) ** 2 / 6)
+
+
+def test_the_largest_angle_of_the_force_is_that_of_a_tenth_of_a_second() -> None:
+    """A sample alone may be a knock; a tenth of a second of them is a turn."""
+    up = np.array([0.0, 0.0, 10.0])
+    acc = np.tile(up, (51, 1))
+    acc[20:25, 0], acc[33, 1] = 0.5, -2.0
+    acc[50, 1] = np.nan
+    block = Block.of(np.arange(51) / 50, acc)
+    assert same_attitude._largest_angle(block, up) == pytest.approx(0.05)
+    acc[33, 1] = -4.0
+    assert same_attitude._largest_angle(block, up) == pytest.approx(0.08)
+    one = Block.of(np.zeros(1), up + np.array([[0.3, 0.4, 0.0]]))
+    assert same_attitude._largest_angle(one, up) == pytest.approx(0.05)
+    rare = Block.of(np.arange(4.0), up + np.diag([0.1, 0.2, 0.3, 0.4])[:, :3])
+    assert same_attitude._largest_angle(rare, up) == pytest.approx(0.03)
+    assert np.isnan(same_attitude._largest_angle(block[50:], up))

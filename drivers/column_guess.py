@@ -20,6 +20,7 @@ from fieldcal.core.escaping import escape_line
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, runs_of_true
 from fieldcal.drivers.framing import Mask
+from fieldcal.drivers.named_lines import read_named_line
 from fieldcal.session.units import ACC_UNITS
 
 LARGEST_RATE_AT_REST = 0.1
@@ -39,6 +40,9 @@ PRESSURES = ((500.0, 1100.0), (5e4, 1.1e5))
 
 EVEN_NOISE = 4.0
 """Largest ratio of the noise of one triad's axes."""
+
+LARGEST_GRAVITY_ERROR = 0.1
+"""Largest error of gravity as low-cost accelerometers read it, as a share of it."""
 
 QUATERNION_ERROR = 1e-3
 """Usual error of the norm of a quaternion, by its digits and its noise."""
@@ -96,7 +100,9 @@ def describe_lines(data: bytes) -> str:
     """
     lines = [line.strip() for line in data.decode("latin-1").split("\n")[1:-1]]
     lines = [line for line in lines if line]
-    plain = sum(line.isascii() and line.isprintable() for line in lines)
+    plain = sum(
+        line.isascii() and line.replace("\t", " ").isprintable() for line in lines
+    )
     if len(lines) < LEAST_LINES or plain < 0.8 * len(lines):
         return ""
     one = escape_line(lines[len(lines) // 2][:SHOWN_CHARACTERS])
@@ -105,9 +111,16 @@ def describe_lines(data: bytes) -> str:
             f"lines of numbers come, such as '{one}': say what their columns are, as"
             " in format=text&columns=t,ax,ay,az,gx,gy,gz&acc_unit=g&gyr_unit=deg/s"
         )
+    if all(read_named_line(line) for line in lines[-LEAST_LINES:]):
+        return (
+            f"lines with names come, such as '{one}': say which names are the"
+            " channels, and their units, as in format=text&map=t=ms,ax=aX,ay=aY,az=aZ,"
+            "gx=gX,gy=gY,gz=gZ&acc_unit=g&gyr_unit=deg/s (`fieldcal ports --probe`"
+            " says them where the names and gravity at rest tell)"
+        )
     return (
         f"lines of text come, such as '{one}', and format=text reads numbers between"
-        " separators only: set the device to send those"
+        " separators only, or behind names: set the device to send those"
     )
 
 
@@ -142,7 +155,7 @@ def _names(values: Array, seconds: float) -> list[str]:
     for i in np.flatnonzero(grows).tolist():
         if "t" not in names and not _counts_samples(values[:, i], seconds):
             names[i] = "t"
-            units.append(f"t_unit={_time_unit(float(np.ptp(values[:, i])), seconds)}")
+            units.append(f"t_unit={time_unit(float(np.ptp(values[:, i])), seconds)}")
         elif "seq" not in names:
             names[i] = "seq"
     acc = _gravity_columns(values, names)
@@ -153,11 +166,8 @@ def _names(values: Array, seconds: float) -> list[str]:
         for beside in (at + 3, at - 3):
             if beside >= 0 and names[beside : beside + 3] == ["-"] * 3:
                 names[beside : beside + 3] = ["gx", "gy", "gz"]
-                rates = values[:, beside : beside + 3]
-                size = float(np.median(np.abs(rates).max(axis=1)))
-                if size > LARGEST_RATE_AT_REST:
-                    small = "m" * (size > LARGEST_DEGREES_AT_REST)
-                    units.append(f"gyr_unit={small}deg/s")
+                if unit := rate_unit_at_rest(values[:, beside : beside + 3]):
+                    units.append(f"gyr_unit={unit}")
                 break
     if (warm := _temperature_column(values, names)) is not None:
         names[warm] = "temperature"
@@ -196,7 +206,15 @@ def _temperature_column(values: Array, names: list[str]) -> int | None:
     return min(likely, key=lambda i: quiet[i], default=None)
 
 
-def _time_unit(span: float, seconds: float) -> str:
+def rate_unit_at_rest(rates: Array) -> str:
+    """Unit of rates at rest, (m, 3); empty where they may be in rad/s or in deg/s."""
+    size = float(np.median(np.abs(rates).max(axis=1)))
+    if not size > LARGEST_RATE_AT_REST:
+        return ""
+    return "mdeg/s" if size > LARGEST_DEGREES_AT_REST else "deg/s"
+
+
+def time_unit(span: float, seconds: float) -> str:
     """Unit in which a span comes nearest to what the host saw, or a fast replay."""
     if not seconds > 0:
         return "s"
@@ -233,12 +251,20 @@ def _triad_of_gravity(values: Array, free: Mask) -> tuple[int, str] | None:
             three = noise[at : at + 3]
             uneven = 0 < three.min() < three.max() / EVEN_NOISE
             apart = ((at - first) % 3 > 0) + ((end - at) % 3 > 0)
-            norm = float(np.median(np.linalg.norm(values[:, at : at + 3], axis=1)))
-            for unit in ("m/s^2", "g", "mg"):
-                off = abs(norm * ACC_UNITS[unit] / G0 - 1)
-                if off < 0.1:
-                    found.append((uneven, apart, off, at, unit))
+            if (near := gravity_unit(values[:, at : at + 3])) is not None:
+                off, unit = near
+                found.append((uneven, apart, off, at, unit))
     return min(found)[3:] if found else None
+
+
+def gravity_unit(three: Array) -> tuple[float, str] | None:
+    """How far the norm of (m, 3) is from gravity, and in which unit it is near."""
+    norm = float(np.median(np.linalg.norm(three, axis=1)))
+    found = [
+        (abs(norm * ACC_UNITS[unit] / G0 - 1), unit) for unit in ("m/s^2", "g", "mg")
+    ]
+    near = min(found)
+    return near if near[0] < LARGEST_GRAVITY_ERROR else None
 
 
 def _quaternion_column(values: Array, free: Mask) -> int | None:

@@ -7,9 +7,16 @@ from time import monotonic
 from typing import NamedTuple
 
 from fieldcal.core.errors import DeviceError
-from fieldcal.drivers.codec import codec_class, recognise_format, wire_formats
+from fieldcal.drivers.codec import (
+    FormatMatch,
+    codec_class,
+    recognise_format,
+    wire_formats,
+)
 from fieldcal.drivers.column_guess import describe_lines
 from fieldcal.drivers.mavlink_detection import detect_autopilot
+from fieldcal.drivers.named_guess import NameReader, guess_named_options
+from fieldcal.drivers.protocols.text import TextCodec
 from fieldcal.drivers.reader import ByteSource
 from fieldcal.drivers.serial_imu import open_port
 
@@ -63,14 +70,20 @@ def baud_rates() -> list[int]:
 
 
 def probe_port(
-    port: str, seconds: float, rates: Iterable[int] | None = None
+    port: str,
+    seconds: float,
+    rates: Iterable[int] | None = None,
+    meaning: NameReader | None = None,
 ) -> DetectedDevice:
-    """Listen at one baud rate after the other, at most so many seconds each."""
+    """Listen at one baud rate after the other, at most so many seconds each.
+
+    Lines whose values have names are known where `meaning` tells what those are.
+    """
     heard = silent = 0
     lines = ""
     for baud in baud_rates() if rates is None else rates:
         try:
-            data, found = _listen_at(port, baud, seconds)
+            data, found = _listen_at(port, baud, seconds, meaning)
         except (DeviceError, OSError) as fault:
             return DetectedDevice(port, "", "", 0, 0.0, str(fault))
         heard += len(data)
@@ -90,7 +103,12 @@ def probe_port(
 
 
 def _identify(
-    port: str, baud: int, data: bytes, took: float, old: int = 0
+    port: str,
+    baud: int,
+    data: bytes,
+    took: float,
+    old: int = 0,
+    meaning: NameReader | None = None,
 ) -> DetectedDevice | None:
     """Say whose bytes these are; None if that is not known.
 
@@ -98,7 +116,10 @@ def _identify(
     the others came in `took` s.
     """
     took *= len(data) / max(1, len(data) - old)
-    if known := recognise_format(data, took):
+    known = recognise_format(data, took)
+    if known is None and meaning is not None:
+        known = _recognise_names(data, took, meaning)
+    if known:
         name, like = known
         query = f"&{like.query}" if like.query else ""
         url = f"serial:{port}?format={name}&baud={baud}{query}"
@@ -118,8 +139,17 @@ def _identify(
     return None
 
 
+def _recognise_names(
+    data: bytes, took: float, meaning: NameReader
+) -> tuple[str, FormatMatch] | None:
+    """Match lines whose values have names; None if the names tell no IMU."""
+    query = guess_named_options(data, took, meaning)
+    like = TextCodec.match_decoded(data, query) if query else None
+    return ("text", like) if like else None
+
+
 def _listen_at(
-    port: str, baud: int, seconds: float
+    port: str, baud: int, seconds: float, meaning: NameReader | None
 ) -> tuple[bytes, DetectedDevice | None]:
     """Bytes of a port, and whose they are; it stays open until that is known."""
     link = open_port(port, baud)
@@ -131,7 +161,7 @@ def _listen_at(
         ):
             data += link.read()
             took = monotonic() - begin
-        return bytes(data), _identify(port, baud, bytes(data), took, old)
+        return bytes(data), _identify(port, baud, bytes(data), took, old, meaning)
     finally:
         link.close()
 

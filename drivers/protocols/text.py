@@ -9,6 +9,11 @@ hexadecimal digits behind ``*`` that NMEA 0183 has: the exclusive or of all betw
 ``$`` and ``*``. ``prefix=IMU`` passes over lines that begin otherwise; a ``$`` is no
 part of it.
 
+``map=ax=aX,ay=aY,az=aZ,t=ms`` in place of ``columns`` reads lines whose values have
+names (`named_lines`), in any order: a sample needs each name of the map once, and other
+names are passed over. ``separator`` is then only what stands behind the prefix, and no
+line is a header.
+
 Headers and comments (lines that begin with a letter or one of # % ; / ") and blank
 lines are passed over, any other line that is not whole is refused. Without a checksum
 the first line counts for nothing: it may be the end of one.
@@ -32,6 +37,7 @@ from fieldcal.drivers.codec import Codec, FormatMatch
 from fieldcal.drivers.column_guess import guess_text_options
 from fieldcal.drivers.framing import Bytes, FrameCandidates, FrameScan, Index, Mask
 from fieldcal.drivers.layouts import RawSamples
+from fieldcal.drivers.named_lines import NUMBER_PATTERN, ChannelMap
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sample_counter import SampleCounter
 from fieldcal.drivers.stamp_resolution import StampResolution
@@ -46,7 +52,7 @@ SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 KNOWN_COLUMNS = ("t", "seq", *CHANNELS, "temperature")
 DEFAULT = "t,ax,ay,az,gx,gy,gz,temperature"
 
-NUMBER = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[nN][aA][nN])\s*")
+NUMBER = re.compile(rf"\s*({NUMBER_PATTERN})\s*")
 
 LF, CR, TAB, SPACE, STAR = b"\n\r\t *"
 
@@ -75,7 +81,7 @@ class TextCodec(Codec):
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)
-        self._names = options.text("columns", DEFAULT).split(",")
+        self._names, self._map = _columns(options)
         self._separator = _separator(options)
         prefix = options.text("prefix").lstrip("$!")
         prefix += chr(self._separator) if prefix else ""
@@ -100,12 +106,11 @@ class TextCodec(Codec):
 
     def _check(self) -> None:
         used = [name for name in self._names if name in KNOWN_COLUMNS]
+        said = f"{'map' if self._map else 'columns'}={','.join(self._names)}"
         if len(set(used)) < len(used):
-            raise InputError(f"columns={','.join(self._names)}: a name occurs twice")
+            raise InputError(f"{said}: a name occurs twice")
         if not any(set(three) <= set(used) for three in (CHANNELS[:3], CHANNELS[3:])):
-            raise InputError(
-                f"columns={','.join(self._names)}: name ax,ay,az or gx,gy,gz or both"
-            )
+            raise InputError(f"{said}: name ax,ay,az or gx,gy,gz or both")
 
     @classmethod
     def match(cls, data: bytes, seconds: float) -> FormatMatch | None:
@@ -148,7 +153,12 @@ class TextCodec(Codec):
         if not lines.any():
             return None
         starts, ends = found.starts[lines], found.ends[lines]
-        values = self._numbers(data, starts, ends)
+        if self._map:
+            body, stop = self._bodies(data, starts, ends - 1)
+            read = map(self._map.values, _texts(data, body, stop))
+            values = np.array(list(read), dtype=float)
+        else:
+            values = self._numbers(data, starts, ends)
         fine = ~np.isinf(values).any(axis=1)
         if "t" in self._names:
             fine &= ~np.isnan(values[:, self._names.index("t")])
@@ -172,26 +182,36 @@ class TextCodec(Codec):
         first = data[starts]
         if len(self._prefix):
             return ~self._ours(data, starts) & (LETTERS | REMARKS | DOLLAR)[first]
-        if self._names[0] in KNOWN_COLUMNS:
+        if self._names[0] in KNOWN_COLUMNS and not self._map:
             return (LETTERS | REMARKS)[first]
         return REMARKS[first]
 
     def _well_formed(self, data: Bytes, starts: Index, newlines: Index) -> Mask:
         """Lines with the right beginning, end and number of fields, (m,)."""
-        stop = newlines - (data[newlines - 1] == CR)
+        body, stop = self._bodies(data, starts, newlines)
         good: Mask = self._ours(data, starts) & (newlines - starts < LONGEST)
         if self._checked:
-            stop = stop - CHECKSUM_LENGTH
             good &= stop > starts
             stop = np.maximum(stop, starts)
             high, low = (data.take(stop + i, mode="clip") for i in (1, 2))
             good &= (data[stop] == STAR) & (
                 HEX[high] * 16 + HEX[low] == _xor(data, starts, stop)
             )
-        body = starts + DOLLAR[data[starts]] + len(self._prefix)
         good &= _between(STRANGE[data], body, stop) == 0
-        good &= self._fields(data, body, stop) == len(self._names)
+        if self._map:
+            read = map(self._map.values, _texts(data, body[good], stop[good]))
+            good[good] = [values is not None for values in read]
+        else:
+            good &= self._fields(data, body, stop) == len(self._names)
         return good
+
+    def _bodies(
+        self, data: Bytes, starts: Index, newlines: Index
+    ) -> tuple[Index, Index]:
+        """Where the fields of lines begin and end, (m,) each."""
+        stop = newlines - (data[newlines - 1] == CR)
+        body = starts + DOLLAR[data[starts]] + len(self._prefix)
+        return body, stop - CHECKSUM_LENGTH * self._checked
 
     def _fields(self, data: Bytes, starts: Index, stops: Index) -> Index:
         """Count the fields between, (m,)."""
@@ -256,6 +276,23 @@ class TextCodec(Codec):
         which = np.arange(len(values))
         raw = RawSamples(which, six * self._scale, temperature, stamps, seq)
         return self._timed(self._clock, raw, t_host, self._seq.steps(seq))
+
+
+def _columns(options: Options) -> tuple[list[str], ChannelMap | None]:
+    """Names of the columns, of lines with names those of the channels of the map."""
+    named = options.text("map")
+    if not named:
+        return options.text("columns", DEFAULT).split(","), None
+    if options.text("columns"):
+        raise InputError("columns and map: give the one that is right for the lines")
+    wanted = ChannelMap(named, KNOWN_COLUMNS)
+    return wanted.channels, wanted
+
+
+def _texts(data: Bytes, starts: Index, stops: Index) -> list[str]:
+    """The text of each stretch."""
+    pairs = zip(starts, stops, strict=True)
+    return [data[a:b].tobytes().decode("latin-1") for a, b in pairs]
 
 
 def _separator(options: Options) -> int:

@@ -73,6 +73,7 @@ def _only_answering_device() -> DetectedDevice:
     """The device on the only serial port that answers."""
     from fieldcal.commands.ports import serial_ports
     from fieldcal.drivers.probe import probe_port
+    from fieldcal.importing.headings.line_names import channels_by_name
 
     ports = [port["port"] for port in serial_ports()]
     if not ports:
@@ -83,7 +84,7 @@ def _only_answering_device() -> DetectedDevice:
     answers = []
     for port in ports:
         _print_line(f"listening to {port} ...")
-        answers.append(probe_port(port, LISTEN_S))
+        answers.append(probe_port(port, LISTEN_S, meaning=channels_by_name))
     known = [answer for answer in answers if answer.url]
     if len(known) == 1:
         for one in answers:

@@ -39,10 +39,11 @@ def run(args: argparse.Namespace) -> int:
     ports = _ports_by_name(args.port) if args.port else serial_ports()
     if args.probe:
         from fieldcal.drivers.probe import probe_port
+        from fieldcal.importing.headings.line_names import channels_by_name
 
         for port in ports:
             sys.stderr.write(f"listening to {port['port']} ...\n")
-            found = probe_port(port["port"], args.seconds, args.baud)
+            found = probe_port(port["port"], args.seconds, args.baud, channels_by_name)
             port["answer"] = found._asdict()
     if args.json:
         sys.stdout.write(json.dumps({"ports": ports}) + "\n")

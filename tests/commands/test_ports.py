@@ -11,11 +11,13 @@ from wires import STREAMS, nmea
 from fieldcal.cli import main
 from fieldcal.core.errors import DeviceSilent
 from fieldcal.drivers import probe as module
-from fieldcal.drivers.column_guess import guess_text_options
+from fieldcal.drivers.column_guess import describe_lines, guess_text_options
 from fieldcal.drivers.driver import open_driver
+from fieldcal.drivers.named_guess import guess_named_options
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.probe import baud_rates, probe_port
 from fieldcal.drivers.protocols.text import TextCodec
+from fieldcal.importing.headings.line_names import channels_by_name
 
 
 def sample(name: str) -> Say:
@@ -145,13 +147,16 @@ def test_the_table_says_how_to_use_it(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_lines_that_nobody_knows_are_shown_with_what_to_do() -> None:
-    """Raw counts, whose unit gravity at rest does not tell, and lines with labels."""
+    """Raw counts, whose unit gravity at rest does not tell, and lines with words."""
 
     def counts(i: int) -> bytes:
         return b"%d;%d;0;-16700;40;2;-3;1\r\n" % (10 * i, 12 + i % 2)
 
     def labels(i: int) -> bytes:
         return b"ax=0.12 ay=-9.79 az=%d.5\r\n" % (i % 2)
+
+    def words(i: int) -> bytes:
+        return b"gravity is %d up\r\n" % (i % 2)
 
     with talking(counts) as port:
         says = probe_port(port, 0.3).says
@@ -162,11 +167,92 @@ def test_lines_that_nobody_knows_are_shown_with_what_to_do() -> None:
         with open_driver(f"serial:{port}?format=witmotion") as imu:
             with pytest.raises(DeviceSilent, match="lines of numbers come, such as"):
                 next(imu.blocks(0.3))
-    with talking(labels) as port:
+    with talking(words) as port:
         assert "reads numbers between separators only" in probe_port(port, 0.3).says
+    with talking(labels) as port:
         with open_driver(f"serial:{port}?format=text") as imu:
             with pytest.raises(DeviceSilent, match=r"such as 'ax=0.12 ay=-9.79 az="):
                 next(imu.blocks(0.3))
+
+
+def test_lines_with_names_are_told_with_the_address_that_reads_them(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def line(i: int) -> bytes:
+        return b"ms: %d, Accel: 0.12 -0.03 %.2f Gyro: 1 2 -3\r\n" % (
+            5 * i,
+            9.81 + 0.01 * (i % 2),
+        )
+
+    with talking(line) as port:
+        assert main(["ports", "--probe", "--seconds", "0.5", "--json", port]) == 0
+        (entry,) = json.loads(capsys.readouterr().out)["ports"]
+        answer = entry["answer"]
+        assert answer["format"] == "text"
+        assert answer["url"].endswith(
+            "&map=t=ms,ax=Accel[0],ay=Accel[1],az=Accel[2],gx=Gyro[0],gy=Gyro[1],"
+            "gz=Gyro[2]&t_unit=ms&gyr_unit=deg/s"
+        )
+        with open_driver(answer["url"]) as imu:
+            block = next(imu.blocks(3.0))
+            np.testing.assert_allclose(block.gyr[0], np.deg2rad([1, 2, -3]))
+            assert block.acc[0, :2].tolist() == [0.12, -0.03]
+
+
+@pytest.mark.parametrize(
+    ("line", "options"),
+    [
+        (
+            "ax=0.12 ay=-0.03 az=9.81 gx=0.1 gy=0.0 gz=-0.2",
+            "map=ax=ax,ay=ay,az=az,gx=gx,gy=gy,gz=gz&gyr_unit=deg/s",
+        ),
+        (
+            "aX: 0.12, aY: -0.01, aZ: 1.01",
+            "map=ax=aX,ay=aY,az=aZ&acc_unit=g",
+        ),
+        (
+            "AccX: 0 g, AccY: 0 g, AccZ: 0.3 g, Temp: 25.3 C",
+            "map=ax=AccX,ay=AccY,az=AccZ,temperature=Temp&acc_unit=g",
+        ),
+        (
+            '{"ax":0.1,"ay":0,"az":9.8,"gx":0,"gy":0,"gz":0.01,"t":10%03d}',
+            "map=ax=ax,ay=ay,az=az,gx=gx,gy=gy,gz=gz,t=t&t_unit=ms",
+        ),
+        (
+            '{"imu":{"acc":[0,1,0],"gyr":[0,0,0]},"id":"a&b"}',
+            "map=ax=imu.acc[0],ay=imu.acc[1],az=imu.acc[2],"
+            "gx=imu.gyr[0],gy=imu.gyr[1],gz=imu.gyr[2]&acc_unit=g",
+        ),
+        ("mx: 1 ax: 0 ay: 0 az: 9.8 my: 2 mz: 3", "map=ax=ax,ay=ay,az=az"),
+    ],
+)
+def test_names_and_gravity_at_rest_tell_the_options(line: str, options: str) -> None:
+    text = "".join(f"{line % i if '%' in line else line}\r\n" for i in range(30))
+    found = guess_named_options(text.encode(), 0.03, channels_by_name)
+    assert found == options
+    made = TextCodec(Options("", f"{found}&rate=100"))
+    block = made.feed(text.encode(), 0.0)
+    assert block is not None and made.health.bad == 0
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "x=1 y=2 z=9.8",
+        "roll=1 pitch=2 yaw=3",
+        "ax=120 ay=10 az=16384",
+        "gx=1 gy=2 gz=3",
+        "ax1=0 ay1=0 az1=9.8 ax2=0 ay2=0 az2=9.8",
+        "ax=0 ay=9.8",
+    ],
+    ids=["no sensor", "angles", "counts", "rates", "two IMUs", "two axes"],
+)
+def test_names_that_leave_a_choice_name_no_device(line: str) -> None:
+    text = f"{line}\r\n" * 30
+    assert guess_named_options(text.encode(), 0.3, channels_by_name) is None
+    assert "format=text&map=" in describe_lines(text.encode())
+    tabs = text.replace(" ", "\t").encode()
+    assert "format=text&map=" in describe_lines(tabs), "as a table in a terminal"
 
 
 def test_silence_and_noise_and_no_port(capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.causes.columns import Course, General, RowView
+from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.system.end_columns import EndColumns

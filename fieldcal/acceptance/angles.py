@@ -20,15 +20,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fieldcal.acceptance.change import usual_values
+from fieldcal.acceptance.check import Check
 from fieldcal.acceptance.verification import Verification
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
+from fieldcal.core.escaping import escape_line
 from fieldcal.core.positions import specific_forces
 from fieldcal.evaluation.observations import angle_setting
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 from fieldcal.solve.reliability import WrongAngles
+
+ANGLES = "angles"
+"""Name of the check whether wrong angles would be noticed."""
 
 SHOWN = 5.0
 """L of (1). With ten degrees of freedom, chi-squared of 25 above its mean is rarer than
@@ -89,6 +94,29 @@ def unnoticed_angle_error(
         f"wrong angles would not be noticed: {worst.description} could move {most} by"
         f" up to {sigmas:.0f} σ"
     )
+
+
+def check_angles(
+    calibration: Calibration,
+    about: Description,
+    limits: GradeLimits,
+    verification: Verification | None,
+    family: Sequence[Calibration] | None,
+) -> list[Check]:
+    """Check whether wrong angles would be noticed."""
+    if about.angles_from:
+        says = f"the angles are certified by {escape_line(about.angles_from)}"
+        return [Check(ANGLES, True, says)]
+    unseen = unnoticed_angle_error(calibration, about, limits, verification, family)
+    if not unseen:
+        return []
+    if not angles_are_stated(calibration, about, limits):
+        return [Check(ANGLES, False, f"{unseen}; {ANGLES_REMEDY}")]
+    said = calibration.info.get("angle_sigma_deg") or 0.0
+    shown = "angles_stated_deg" in calibration.info
+    how = "as the recording shows" if shown else "as stated"
+    relied = f"the result relies on angles set to ± {said:.2g}°, {how}: {unseen}"
+    return [Check(ANGLES, None, relied)]
 
 
 def angle_error_explaining(calibration: Calibration, off: Mapping[str, float]) -> str:

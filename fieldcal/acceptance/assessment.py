@@ -8,7 +8,7 @@ positions that the operator accepted in spite of a warning.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,11 @@ from fieldcal.acceptance.family_at_temperature import (
 )
 from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.acceptance.mean_removal import removed_bias_sentences
+from fieldcal.acceptance.run_facts import (
+    insisted_positions,
+    link_counts,
+    restart_warnings,
+)
 from fieldcal.acceptance.site import (
     gravity_contradiction,
     gravity_missing_warning,
@@ -33,7 +38,6 @@ from fieldcal.acceptance.verification import Verification, planned_verification,
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
-from fieldcal.core.sampling import shows_losses
 from fieldcal.core.sentences import join_words
 from fieldcal.evaluation.observations import UsableWindows, angle_setting
 from fieldcal.history.store import History, HistoryRun, earlier_runs, family_runs
@@ -41,7 +45,7 @@ from fieldcal.session.folder import Session
 from fieldcal.session.installed_calibration import subtracts_gyro_offset
 from fieldcal.session.marks import taken_windows
 from fieldcal.session.recorded_part import recorded_part
-from fieldcal.windows import Average, average
+from fieldcal.windows import average
 from fieldcal.windows.dead_axis import broken_axis_messages
 
 TIME_UNKNOWN = (
@@ -70,42 +74,87 @@ def assess(
     """
     marks = list(session.marks())
     taken_at = start_time(marks)
-    warnings = list(calibration.warnings)
-    earlier: FamilyAtTemperature | None = None
-    usual: Sequence[HistoryRun] = ()
-    serial = str(session.about.device.get("serial", ""))
-    if history is not None and serial:
-        try:
-            runs = history.runs(serial)
-            part = recorded_part(session.folder) if runs else None
-            usual = family_runs(earlier_runs(runs, session.folder, taken_at, part))
-            if runs and taken_at is None:
-                warnings.append(TIME_UNKNOWN)
-            earlier = family_at_temperature(calibration, usual, limits)
-        except FieldcalError as error:
-            warnings.append(str(error))
-    dead = broken_axis_messages(session.block.six)
-    taken_out = _removed_biases(calibration, session, windows, limits)
+    earlier = _EarlierCalibrations.of(calibration, session, limits, history, taken_at)
+    warnings = [*calibration.warnings, *earlier.warnings]
+    warnings += [w for w in restart_warnings(marks) if w not in warnings]
     circumstances = Circumstances(
         temperatures=[a.temperature for a in windows.averages],
-        link=_link(session, windows.averages, marks),
+        link=link_counts(session, windows.averages, marks),
         verification=_verification(calibration, session, marks),
-        family=earlier.calibrations if earlier else None,
-        temperature_sigma=earlier.sigma if earlier else {},
-        doubts=[*_insisted_positions(marks), *dead, *taken_out],
+        family=earlier.family.calibrations if earlier.family else None,
+        temperature_sigma=earlier.family.sigma if earlier.family else {},
+        doubts=[
+            *insisted_positions(marks),
+            *broken_axis_messages(session.block.six),
+            *_removed_biases(calibration, session, windows, limits),
+        ],
         windows=windows.at_rest(session).averages,
         position_numbers=windows.position_numbers,
     )
-    warnings += [w for w in _restart_warnings(marks) if w not in warnings]
     made = decide(calibration, session.about, limits, circumstances)
-    site = {"latitude_deg": session.about.latitude_deg}
-    site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
-    info = {**calibration.info, "site": site, "taken_at": taken_at}
-    if (costs := effect_of_temperature_change(calibration, usual, limits)) is not None:
+    info = {**calibration.info, "site": _site_info(session), "taken_at": taken_at}
+    costs = effect_of_temperature_change(calibration, earlier.runs, limits)
+    if costs is not None:
         info["temperature_change"] = costs
     return with_decision(
         replace(calibration, warnings=tuple(warnings), info=info), made
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _EarlierCalibrations:
+    """What the history holds of the device.
+
+    Attributes
+    ----------
+    runs : earlier runs of the device, oldest first
+    family : their calibrations, taken to the temperature of this one; None without a
+        history, or if it cannot be read
+    warnings : a sentence each
+
+    """
+
+    runs: Sequence[HistoryRun] = ()
+    family: FamilyAtTemperature | None = None
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        calibration: Calibration,
+        session: Session,
+        limits: GradeLimits,
+        history: History | None,
+        taken_at: str | None,
+    ) -> _EarlierCalibrations:
+        """Read the history of the session's device; nothing if it has no serial number.
+
+        `taken_at` is the time of the session, ISO 8601.
+        """
+        serial = str(session.about.device.get("serial", ""))
+        if history is None or not serial:
+            return cls()
+        usual: Sequence[HistoryRun] = ()
+        warnings: tuple[str, ...] = ()
+        try:
+            runs = history.runs(serial)
+            part = recorded_part(session.folder) if runs else None
+            usual = family_runs(earlier_runs(runs, session.folder, taken_at, part))
+            warnings = (TIME_UNKNOWN,) if runs and taken_at is None else ()
+            family = family_at_temperature(calibration, usual, limits)
+        except FieldcalError as error:
+            return cls(usual, None, (*warnings, str(error)))
+        return cls(usual, family, warnings)
+
+
+def _site_info(session: Session) -> dict[str, float | None]:
+    """Latitude, deg, height, m, and gravity, m/s^2, for the calibration's `info`."""
+    about = session.about
+    return {
+        "latitude_deg": about.latitude_deg,
+        "height_m": about.height_m,
+        "gravity": about.gravity,
+    }
 
 
 def with_faults(
@@ -227,71 +276,6 @@ def _verification(
     stated = calibration.info.get("angles_stated_deg", used)
     angle = float(np.deg2rad(stated or angle_setting(session.about)))
     return verify(calibration, session.about, position, held, angle)
-
-
-def _link(
-    session: Session, windows: Sequence[Average], marks: Sequence[Mapping[str, Any]]
-) -> dict[str, int]:
-    """Samples and missing samples in the windows; frames of the whole run, and refused.
-
-    Gaps between the used pieces of a window do not count as missing. Nothing is said of
-    missing samples if the times show none.
-    """
-    samples = missing = 0
-    block, gaps, shown = session.block, session.about.excluded_spans, True
-    period = float(np.median(np.diff(block.t))) if len(block) > 1 else np.nan
-    for window in windows:
-        t = block.between(window.start, np.nextafter(window.end, np.inf)).t
-        samples += len(t)
-        shown &= shows_losses(t)
-        if len(t) > 1 and period > 0:
-            lost = np.maximum(np.rint(np.diff(t) / period) - 1, 0)
-            for start, end in gaps:
-                lost[(t[:-1] >= np.nextafter(start, -np.inf)) & (t[1:] <= end)] = 0
-            missing += int(lost.sum())
-    bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "link")
-    counts = {"samples": samples, "bad": bad, "taken": len(block)}
-    return counts | ({"missing": missing} if shown else {})
-
-
-def _insisted_positions(marks: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Positions that the operator confirmed although they looked wrong."""
-    insisted: dict[int, str] = {}
-    for mark in marks:
-        number = mark.get("position")
-        if not isinstance(number, int):
-            continue
-        if mark.get("event") == "asked":
-            insisted.pop(number, None)
-        elif mark.get("event") == "insisted":
-            insisted[number] = str(mark.get("text", ""))
-    return [
-        f"position {number + 1} was accepted by the operator although {text}"
-        for number, text in sorted(insisted.items())
-    ]
-
-
-def _restart_warnings(marks: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Warnings that the windows come from before and after a restart of the device."""
-    taken: list[int] = []
-    said = []
-    for mark in marks:
-        if mark.get("event") == "window":
-            taken.append(int(mark["position"]))
-        elif mark.get("event") == "rejoined" and taken:
-            said.append(
-                f"the recording was interrupted after position {taken[-1] + 1}: if the"
-                " device lost power meanwhile, its bias may have changed; record all"
-                " positions without a restart"
-            )
-    counted = sum(int(m.get("restarts", 0)) for m in marks if m.get("event") == "link")
-    if counted:
-        times = "once" if counted == 1 else f"{counted} times"
-        said.append(
-            f"the device restarted {times} during the run, and its bias may differ from"
-            " start to start: record all positions without a restart"
-        )
-    return said
 
 
 def limits_path(session: Session, given: Path | None) -> Path | None:

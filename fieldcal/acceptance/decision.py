@@ -13,43 +13,25 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.acceptance.angles import (
-    ANGLES_REMEDY,
-    angles_are_stated,
-    unnoticed_angle_error,
-)
+from fieldcal.acceptance.agreement import check_fit, check_gyroscopes
+from fieldcal.acceptance.angles import ANGLES, check_angles
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.check import Check
 from fieldcal.acceptance.conditions import check_link, check_temperature
 from fieldcal.acceptance.factory import check_factory_errors
 from fieldcal.acceptance.growth import TIMES, NavigationErrors, navigation_errors
-from fieldcal.acceptance.harmless import harmless_scatter_note
-from fieldcal.acceptance.jump import bias_jump_warning
+from fieldcal.acceptance.jump import check_jump
 from fieldcal.acceptance.level import check_level
 from fieldcal.acceptance.remedy import Remedy, cheapest_remedy
-from fieldcal.acceptance.site import (
-    gravity_contradiction,
-    gravity_missing_warning,
-    latitude_missing_warning,
-)
-from fieldcal.acceptance.turn_agreement import turn_disagreement
+from fieldcal.acceptance.site import check_site
+from fieldcal.acceptance.turn_agreement import check_turns
 from fieldcal.acceptance.uncertainty import UNCERTAINTY, check_uncertainty
-from fieldcal.acceptance.verification import Verification
-from fieldcal.acceptance.witnesses import (
-    has_witnesses,
-    rejected_positions,
-    witness_sentence,
-)
+from fieldcal.acceptance.verification import Verification, check_verification
+from fieldcal.acceptance.witnesses import check_doubtful_position
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.core.escaping import escape_line
-from fieldcal.core.probability import chi2_tail
 from fieldcal.session.description import Description
-from fieldcal.solve.doubtful_position import DoubtfulPosition
 from fieldcal.windows import Average
-
-ANGLES = "angles"
-"""Name of the check whether wrong angles would be noticed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,19 +88,21 @@ def decide(
     circumstances: Circumstances,
 ) -> Decision:
     """Check a calibration against limits."""
-    verification = _verification_check(circumstances.verification, limits)
+    verification = check_verification(circumstances.verification, limits)
     checks = [
-        _fit_check(calibration, limits),
+        check_fit(calibration, limits),
         *_examination_checks(calibration),
-        *_doubtful_position_checks(calibration, verification.ok is True),
-        *_gyroscope_checks(calibration, limits),
-        *_turn_checks(calibration, limits),
-        *_jump_checks(calibration, limits),
-        *_angle_checks(calibration, about, limits, circumstances),
+        *check_doubtful_position(calibration, verification.ok is True),
+        *check_gyroscopes(calibration, limits),
+        *check_turns(calibration, limits),
+        *check_jump(calibration, limits),
+        *check_angles(
+            calibration, about, limits, circumstances.verification, circumstances.family
+        ),
         *check_factory_errors(calibration, about, limits),
         *check_level(calibration, about),
         *check_uncertainty(calibration, about, limits, circumstances.windows),
-        *_site_checks(calibration, about),
+        *check_site(calibration, about),
         *check_change(
             calibration, limits, circumstances.family, circumstances.temperature_sigma
         ),
@@ -188,52 +172,6 @@ def with_decision(calibration: Calibration, made: Decision) -> Calibration:
     return replace(calibration, info={**calibration.info, **more})
 
 
-def _fit_check(calibration: Calibration, limits: GradeLimits) -> Check:
-    if not calibration.good:
-        return Check(
-            "fit", False, "the estimate is bad: " + _first_warning(calibration)
-        )
-    if calibration.dof <= 0 or not np.isfinite(calibration.chi2):
-        return Check("fit", None, "no degree of freedom is left to check the fit")
-    return _agreement_check(
-        "fit", "positions", calibration.chi2, calibration.dof, calibration, limits
-    )
-
-
-def _gyroscope_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
-    """Check the agreement of the gyroscopes' means, if accelerometers were measured."""
-    gyr = calibration.info.get("gyroscopes", {})
-    chi2, dof = float(gyr.get("chi2", 0.0)), int(gyr.get("dof", 0))
-    if dof <= 0 or "acc_bias" not in calibration.groups:
-        return []
-    what = "gyroscopes at rest"
-    return [_agreement_check("gyroscopes", what, chi2, dof, calibration, limits, "gyr")]
-
-
-def _agreement_check(
-    name: str,
-    what: str,
-    chi2: float,
-    dof: int,
-    calibration: Calibration,
-    limits: GradeLimits,
-    sensor: str = "acc",
-) -> Check:
-    """Check the agreement of the means of a sensor; a harmless scatter passes."""
-    chance = chi2_tail(chi2, dof)
-    agree = chance >= limits.fit_chance
-    word = "agree" if agree else "do not agree"
-    says = (
-        f"the {what} {word} with each other: χ² = {chi2:.1f} with"
-        f" {dof} degrees of freedom, probability {chance:.2g}, required"
-        f" {limits.fit_chance:.2g}"
-    )
-    if not agree and (small := harmless_scatter_note(calibration, limits, sensor)):
-        says += f"; {small}"
-        agree = True
-    return Check(name, agree, says, chance, limits.fit_chance, "1")
-
-
 def _examination_checks(calibration: Calibration) -> list[Check]:
     """NO-GO if only means were used: samples and turns might contradict them."""
     why = calibration.info.get("unexamined")
@@ -244,100 +182,3 @@ def _examination_checks(calibration: Calibration) -> list[Check]:
         f" means of the windows: {why}"
     )
     return [Check("recording", False, says)]
-
-
-def _doubtful_position_checks(calibration: Calibration, verified: bool) -> list[Check]:
-    """Report a doubtful position; NO-GO if too few others confirm the result."""
-    doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
-    checks = [Check("positions", None, doubt.sentence)] if doubt else []
-    if verified or not rejected_positions(calibration):
-        return checks
-    return [
-        *checks,
-        Check("witnesses", has_witnesses(calibration), witness_sentence(calibration)),
-    ]
-
-
-def _turn_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
-    """Check whether the turns measured by the gyroscopes agree with the positions."""
-    apart = turn_disagreement(calibration, limits)
-    return [Check("turns", False, apart)] if apart else []
-
-
-def _jump_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
-    """Check whether biases jump as if another device had been recorded."""
-    far = bias_jump_warning(calibration, limits)
-    return [Check("jump", False, far)] if far else []
-
-
-def _angle_checks(
-    calibration: Calibration,
-    about: Description,
-    limits: GradeLimits,
-    circumstances: Circumstances,
-) -> list[Check]:
-    """Check whether wrong angles would be noticed."""
-    given = (circumstances.verification, circumstances.family)
-    if about.angles_from:
-        says = f"the angles are certified by {escape_line(about.angles_from)}"
-        return [Check(ANGLES, True, says)]
-    unseen = unnoticed_angle_error(calibration, about, limits, *given)
-    if not unseen:
-        return []
-    if not angles_are_stated(calibration, about, limits):
-        return [Check(ANGLES, False, f"{unseen}; {ANGLES_REMEDY}")]
-    said = calibration.info.get("angle_sigma_deg") or 0.0
-    shown = "angles_stated_deg" in calibration.info
-    how = "as the recording shows" if shown else "as stated"
-    relied = f"the result relies on angles set to ± {said:.2g}°, {how}: {unseen}"
-    return [Check(ANGLES, None, relied)]
-
-
-def _first_warning(calibration: Calibration) -> str:
-    return calibration.warnings[0] if calibration.warnings else "see the fit"
-
-
-def _site_checks(calibration: Calibration, about: Description) -> list[Check]:
-    """Check whether what calibrates the sensors is known: gravity, the Earth's rate."""
-    wrong = ""
-    if "acc_scale" in calibration.groups:
-        wrong = gravity_missing_warning(about) or gravity_contradiction(about)
-    if not wrong and "gyr_bias" in calibration.groups:
-        wrong = latitude_missing_warning(about)
-    return [Check("site", False, wrong)] if wrong else []
-
-
-def _verification_check(
-    verification: Verification | None, limits: GradeLimits
-) -> Check:
-    if verification is None:
-        says = "no verification position was recorded (--verify)"
-        return Check("verification", None, says)
-    if not verification.measured:
-        says = (
-            f"{verification.position.name}, which was to verify the result, could not"
-            f" be measured ({verification.reason}): record it again"
-        )
-        return Check("verification", False, says)
-    far = verification.residual_size > limits.verification_residual
-    odd = verification.chance < limits.verification_chance
-    sigma = float(np.linalg.norm(verification.sigma))
-    says = (
-        f"at {verification.position.name}, which was not fitted, the accelerometers"
-        f" differ from the prediction by {verification.residual_size:.2g} ±"
-        f" {sigma:.2g} m/s², allowed {limits.verification_residual:.2g} m/s²"
-    )
-    if odd:
-        says += (
-            "; the ± of the calibration does not explain this difference (probability"
-            f" {verification.chance:.1g})"
-        )
-    limit = limits.verification_residual
-    return Check(
-        "verification",
-        not (far or odd),
-        says,
-        verification.residual_size,
-        limit,
-        "m/s^2",
-    )

@@ -11,6 +11,7 @@ well, although the fit assumes them to be the same before and after the jump.
 
 from __future__ import annotations
 
+from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
@@ -39,3 +40,9 @@ def bias_jump_warning(calibration: Calibration, limits: GradeLimits) -> str:
         f" χ² = {chi2:.0f} of {len(far)} biases): another device was put in its place,"
         " or it was damaged; record all positions of one device"
     )
+
+
+def check_jump(calibration: Calibration, limits: GradeLimits) -> list[Check]:
+    """Check whether biases jump as if another device had been recorded."""
+    far = bias_jump_warning(calibration, limits)
+    return [Check("jump", False, far)] if far else []

@@ -10,6 +10,8 @@ between the sea and the highest villages.
 
 from __future__ import annotations
 
+from fieldcal.acceptance.check import Check
+from fieldcal.calibration import Calibration
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.gravity import normal_gravity
 from fieldcal.session.description import Description
@@ -79,3 +81,13 @@ def gravity_contradiction(about: Description) -> str:
         f" {usual} m/s², and differs from that by {ANOMALY:g} m/s² at most; correct"
         " gravity, or latitude_deg and height_m, and solve again"
     )
+
+
+def check_site(calibration: Calibration, about: Description) -> list[Check]:
+    """Check whether what calibrates the sensors is known: gravity, the Earth's rate."""
+    wrong = ""
+    if "acc_scale" in calibration.groups:
+        wrong = gravity_missing_warning(about) or gravity_contradiction(about)
+    if not wrong and "gyr_bias" in calibration.groups:
+        wrong = latitude_missing_warning(about)
+    return [Check("site", False, wrong)] if wrong else []

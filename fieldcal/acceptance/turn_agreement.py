@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.probability import chi2_tail
@@ -30,3 +31,9 @@ def turn_disagreement(calibration: Calibration, limits: GradeLimits) -> str:
         " is too small, or angles in session.toml are wrong; run fieldcal diagnose to"
         " see which"
     )
+
+
+def check_turns(calibration: Calibration, limits: GradeLimits) -> list[Check]:
+    """Check whether the turns measured by the gyroscopes agree with the positions."""
+    apart = turn_disagreement(calibration, limits)
+    return [Check("turns", False, apart)] if apart else []

@@ -17,7 +17,9 @@ from itertools import product
 
 import numpy as np
 
+from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.positions import Position, specific_forces
 from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import ACC, Array
@@ -185,3 +187,38 @@ def propose_verification(positions: Sequence[Position]) -> Position:
         return round(float(np.linalg.norm(there - f, axis=1).min()), 9)
 
     return Position.deg(*max(free, key=nearest))
+
+
+def check_verification(verification: Verification | None, limits: GradeLimits) -> Check:
+    """Check the residual of a position that was not fitted, if there is one."""
+    if verification is None:
+        says = "no verification position was recorded (--verify)"
+        return Check("verification", None, says)
+    if not verification.measured:
+        says = (
+            f"{verification.position.name}, which was to verify the result, could not"
+            f" be measured ({verification.reason}): record it again"
+        )
+        return Check("verification", False, says)
+    far = verification.residual_size > limits.verification_residual
+    odd = verification.chance < limits.verification_chance
+    sigma = float(np.linalg.norm(verification.sigma))
+    says = (
+        f"at {verification.position.name}, which was not fitted, the accelerometers"
+        f" differ from the prediction by {verification.residual_size:.2g} ±"
+        f" {sigma:.2g} m/s², allowed {limits.verification_residual:.2g} m/s²"
+    )
+    if odd:
+        says += (
+            "; the ± of the calibration does not explain this difference (probability"
+            f" {verification.chance:.1g})"
+        )
+    limit = limits.verification_residual
+    return Check(
+        "verification",
+        not (far or odd),
+        says,
+        verification.residual_size,
+        limit,
+        "m/s^2",
+    )

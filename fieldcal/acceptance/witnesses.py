@@ -12,8 +12,10 @@ agrees.
 
 from __future__ import annotations
 
+from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
 from fieldcal.model import thresholds
+from fieldcal.solve.doubtful_position import DoubtfulPosition
 
 
 def rejected_positions(calibration: Calibration) -> int:
@@ -57,3 +59,15 @@ def _needed(calibration: Calibration) -> int:
     """Positions needed: each gives 3 numbers, or 1 if its angles are unknown."""
     of_acc = [name for name in calibration.names if not name.startswith("gyr")]
     return -(-len(of_acc) // (1 if calibration.method == "scalar" else 3))
+
+
+def check_doubtful_position(calibration: Calibration, verified: bool) -> list[Check]:
+    """Report a doubtful position; NO-GO if too few others confirm the result."""
+    doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
+    checks = [Check("positions", None, doubt.sentence)] if doubt else []
+    if verified or not rejected_positions(calibration):
+        return checks
+    return [
+        *checks,
+        Check("witnesses", has_witnesses(calibration), witness_sentence(calibration)),
+    ]

@@ -38,7 +38,7 @@ import numpy as np
 
 from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import Array
-from fieldcal.model.evidence.gram import evidence_gains
+from fieldcal.model.evidence.eliminated import evidence_gains
 from fieldcal.model.evidence.sizing import LOG_DENSITY
 
 Relation = Literal["real", "simulator", "same", "other", "neither"]

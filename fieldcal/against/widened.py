@@ -16,7 +16,7 @@ from fieldcal.against.joint import EffectInformation
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
 from fieldcal.model.posterior.size_average import average_over_sizes

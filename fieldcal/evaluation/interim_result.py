@@ -9,7 +9,7 @@ from typing import Any
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.evaluation.solution import PreparedSession
+from fieldcal.evaluation.prepared_session import PreparedSession
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
-from fieldcal.model.evidence.gram import evidence_gains
+from fieldcal.model.evidence.eliminated import evidence_gains
 
 DENSITY = np.log(priors.density())
 """Logarithm of the prior density of each size."""

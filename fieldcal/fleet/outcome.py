@@ -22,7 +22,8 @@ from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.omitted_effects import with_repaired_bytes
-from fieldcal.evaluation.solution import PreparedSession, solve_prepared
+from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.solution import solve_prepared
 from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration

@@ -26,7 +26,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.search.set_at_instability import with_typical_calibration
 
 MAX_LOG_TIME_DISTANCE = 0.1

@@ -17,7 +17,8 @@ from fieldcal.core.positions import Position, alpha_beta_angles, gamma_angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
-from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.basis import RowView
+from fieldcal.model.causes.effect_columns import effect_basis
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
@@ -82,7 +83,7 @@ def _columns(effect: Effect, view: RowView) -> Array | None:
     """Columns of an effect in the six outputs at rest, (6n, k); None without any."""
     if effect.shapes or not isinstance(effect, Motion | Sensor) or not effect.params:
         return None
-    seen = columns.effect_basis(effect, {}, 0).evaluate(view)
+    seen = effect_basis(effect, {}, 0).evaluate(view)
     typical = np.array([p.typical for p in effect.params])
     flat: Array = (seen * typical).reshape(-1, len(typical))
     return flat

@@ -37,11 +37,12 @@ from fieldcal.core.frames import direction_cosines, shortest_rotation
 from fieldcal.core.positions import Position, alpha_beta_angles
 from fieldcal.core.samples import GYR, Array, Index
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.cause import CLOSURE, Cause
-from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.planned import rows_at_session_end
-from fieldcal.model.evidence.gram import Eliminated, WeightedGram, evidence_gains
+from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
+from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import LOG_DENSITY
 from fieldcal.model.rows.reduce import Rows

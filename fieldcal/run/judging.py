@@ -12,7 +12,8 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import PreparedSession, solve_prepared
+from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.solution import solve_prepared
 from fieldcal.session.folder import Session
 
 

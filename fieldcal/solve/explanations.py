@@ -27,8 +27,8 @@ import numpy as np
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.model import priors, thresholds
+from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import (
     groups_at_points,

@@ -21,8 +21,8 @@ from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
-from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import effect_group, factory_groups

@@ -51,33 +51,18 @@ def build_calibration(
         If it has no parameter.
 
     """
-    names, sigma = estimate.names, np.sqrt(np.diag(estimate.covariance))
-    worst = largest_cross_coupling_effect(estimate)
+    names = estimate.names
     sentences = [
-        words.effects_warning(
-            estimate.any_cause_probability,
-            estimate.causes,
-            names,
-            estimate.shift_sigmas,
-            estimate.valid_at_s,
-        ),
+        _effects_sentence(estimate),
         lot_contribution.sentence if lot_contribution else "",
-        *undetermined_warnings(method, observations, estimate),
-        worst.sentence if worst else "",
-        *notes,
-        *level_warnings(method, options, observations),
+        *_remarks(method, observations, options, estimate, notes),
     ]
     if not names:
         raise NotObservable(
             "these positions determine nothing: " + "; ".join(filter(None, sentences))
         )
     of_acc = any(map(_is_acc, names))
-    odd = [
-        *implausible_values(names, estimate.values, sigma, observations.nominal),
-        *misdirected_turns(_turn_names(estimate.contradicted_turns, observations)),
-        *_wrong_latitude(estimate, observations),
-        *contradiction_warnings(observations, estimate, of_acc),
-    ]
+    odd = _reasons_against(observations, estimate, of_acc)
     sentences += agreement_warnings(method, observations, estimate)
     fit = estimate.acc if of_acc else estimate.gyr
     info = _info(method, observations, options, estimate)
@@ -95,6 +80,50 @@ def build_calibration(
         good=not odd,
         info=info,
     )
+
+
+def _effects_sentence(estimate: ParameterEstimate) -> str:
+    """Sentence on the effects that were estimated beside the parameters."""
+    return words.effects_warning(
+        estimate.any_cause_probability,
+        estimate.causes,
+        estimate.names,
+        estimate.shift_sigmas,
+        estimate.valid_at_s,
+    )
+
+
+def _remarks(
+    method: Method,
+    observations: Observations,
+    options: SolveOptions,
+    estimate: ParameterEstimate,
+    notes: Sequence[str],
+) -> list[str]:
+    """Sentences on what the values do not contain, and on assumptions; may be empty."""
+    worst = largest_cross_coupling_effect(estimate)
+    return [
+        *undetermined_warnings(method, observations, estimate),
+        worst.sentence if worst else "",
+        *notes,
+        *level_warnings(method, options, observations),
+    ]
+
+
+def _reasons_against(
+    observations: Observations, estimate: ParameterEstimate, of_acc: bool
+) -> list[str]:
+    """Sentences on why the result is bad; empty if it is good.
+
+    `of_acc` states whether parameters of the accelerometers are estimated.
+    """
+    names, sigma = estimate.names, np.sqrt(np.diag(estimate.covariance))
+    return [
+        *implausible_values(names, estimate.values, sigma, observations.nominal),
+        *misdirected_turns(_turn_names(estimate.contradicted_turns, observations)),
+        *_wrong_latitude(estimate, observations),
+        *contradiction_warnings(observations, estimate, of_acc),
+    ]
 
 
 def _is_acc(name: str) -> bool:
@@ -152,44 +181,25 @@ def _info(
     options: SolveOptions,
     estimate: ParameterEstimate,
 ) -> dict[str, Any]:
-    known = observations.temperature[np.isfinite(observations.temperature)]
-    latitude = observations.latitude
-    wanted = estimate.parameter_set.options
     out: dict[str, Any] = {
-        "conditions": {
-            "positions": len(observations),
-            "gravity": observations.gravity,
-            "latitude_deg": None if latitude is None else float(np.rad2deg(latitude)),
-            "temperature_degc": float(known.mean()) if len(known) else None,
-            "temperature_sd_k": float(known.std()) if len(known) else None,
-            "grade": observations.grade,
-        },
+        "conditions": _conditions(observations),
         "bad_position": [round(float(p), 4) for p in estimate.bad_probability],
         "extra_scatter": window_scatter(estimate.mixture, (0, 1, 2)),
         "log_evidence": estimate.score,
         "angle_sigma_deg": options.angles_deg,
-        "square_sigma": 0.0 if wanted.cross else wanted.factory.cross_coupling,
-        "quadratic_sigma": wanted.factory.quadratic,
-        "g_sensitivity_sigma": wanted.factory.g_sensitivity,
-        "acc_bias_per_k_sigma": wanted.factory.acc_per_k,
-        "gyr_bias_per_k_sigma": wanted.factory.gyr_per_k,
-        "acc_hysteresis_sigma": wanted.factory.hysteresis,
+        **_factory_sigmas(estimate),
     }
     if doubt := DoubtfulPosition.of(observations, estimate.bad_probability):
         out["doubtful_position"] = doubt.to_json()
     if np.isfinite(estimate.acc.held_out_rms):
         out["left_out_rms"] = estimate.acc.held_out_rms
-    if estimate.parameter_set.options.level_deg:
-        out["level_sigma_deg"] = estimate.parameter_set.options.level_deg
+    wanted = estimate.parameter_set.options
+    if wanted.level_deg:
+        out["level_sigma_deg"] = wanted.level_deg
     if wanted.tilt != "none" and wanted.beside_tilt_deg:
         out["beside_tilt_sigma_deg"] = wanted.beside_tilt_deg
     if observations.has_gyr:
-        gyr = estimate.gyr
-        out["gyroscopes"] = {
-            "chi2": gyr.chi2, "dof": gyr.dof, "unit": "rad/s",
-            "rms": gyr.rms if np.isfinite(gyr.rms) else None,
-            "extra_scatter": window_scatter(estimate.mixture, (3, 4, 5)),
-        }  # fmt: skip
+        out["gyroscopes"] = _gyroscope_fit(estimate)
     if harmful := [w for w in estimate.wrong_angles if _is_harmful(w, estimate)]:
         out["wrong_angles"] = [w.to_json() for w in harmful]
     if estimate.causes or estimate.valid_at_s is not None:
@@ -199,3 +209,40 @@ def _info(
         scatter = closure_scatter(estimate.mixture)
         out["turns"] = {"chi2": chi2, "dof": dof, "scatter_rad": scatter}
     return out
+
+
+def _conditions(observations: Observations) -> dict[str, Any]:
+    """The conditions of the recording; SI units, temperatures in deg C and K."""
+    known = observations.temperature[np.isfinite(observations.temperature)]
+    latitude = observations.latitude
+    return {
+        "positions": len(observations),
+        "gravity": observations.gravity,
+        "latitude_deg": None if latitude is None else float(np.rad2deg(latitude)),
+        "temperature_degc": float(known.mean()) if len(known) else None,
+        "temperature_sd_k": float(known.std()) if len(known) else None,
+        "grade": observations.grade,
+    }
+
+
+def _factory_sigmas(estimate: ParameterEstimate) -> dict[str, float]:
+    """Sizes of the factory errors that the uncertainties contain, SI units."""
+    wanted = estimate.parameter_set.options
+    return {
+        "square_sigma": 0.0 if wanted.cross else wanted.factory.cross_coupling,
+        "quadratic_sigma": wanted.factory.quadratic,
+        "g_sensitivity_sigma": wanted.factory.g_sensitivity,
+        "acc_bias_per_k_sigma": wanted.factory.acc_per_k,
+        "gyr_bias_per_k_sigma": wanted.factory.gyr_per_k,
+        "acc_hysteresis_sigma": wanted.factory.hysteresis,
+    }
+
+
+def _gyroscope_fit(estimate: ParameterEstimate) -> dict[str, Any]:
+    """How the means of the gyroscopes fit, rad/s."""
+    gyr = estimate.gyr
+    return {
+        "chi2": gyr.chi2, "dof": gyr.dof, "unit": "rad/s",
+        "rms": gyr.rms if np.isfinite(gyr.rms) else None,
+        "extra_scatter": window_scatter(estimate.mixture, (3, 4, 5)),
+    }  # fmt: skip

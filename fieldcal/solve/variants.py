@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.evidence.gram import Eliminated, evidence_gains
+from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
 from fieldcal.model.evidence.sets import Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
 from fieldcal.solve.explanations import WeightedExplanation, has_equation

@@ -17,9 +17,9 @@ import numpy as np
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import BiasChange
 

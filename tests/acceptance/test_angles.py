@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 from observed import force, observe
 
-from fieldcal.acceptance.angles import unnoticed_angle_error, unstated_angles_warning
-from fieldcal.acceptance.decision import ANGLES, Circumstances, Decision, decide
+from fieldcal.acceptance.angles import (
+    ANGLES,
+    unnoticed_angle_error,
+    unstated_angles_warning,
+)
+from fieldcal.acceptance.decision import Circumstances, Decision, decide
 from fieldcal.acceptance.verification import Verification, verify
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.positions import FIVE_POSITIONS, Position

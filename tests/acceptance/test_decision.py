@@ -29,7 +29,7 @@ from fieldcal.core.positions import (
     Position,
 )
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import PreparedSession
+from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.history.family import next_run_distribution
 from fieldcal.session import description
 from fieldcal.session.folder import Session

@@ -16,7 +16,8 @@ from fieldcal.core import base_motion
 from fieldcal.core.base_motion import BaseMotion
 from fieldcal.diagnosis import diagnose
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import PreparedSession, solve_session
+from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import earth

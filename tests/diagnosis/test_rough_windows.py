@@ -14,7 +14,7 @@ from fieldcal.cli import main
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.chain import check_chain
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import PreparedSession
+from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile
 

@@ -12,7 +12,8 @@ from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.effects.earth_rate import EarthRate
-from fieldcal.model.causes.columns import RowView, effect_basis
+from fieldcal.model.causes.basis import RowView
+from fieldcal.model.causes.effect_columns import effect_basis
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Line, Motion, Sensor
 from fieldcal.physics.experience import Experience

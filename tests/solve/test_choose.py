@@ -14,13 +14,14 @@ from test_result import observed
 from fieldcal.core.positions import TWO_POSITIONS
 from fieldcal.solve import choose
 from fieldcal.solve.options import SolveOptions
+from fieldcal.solve.session_fit import SessionFit, determines_all
 
 LEVEL = 0.3
 OFFSET, BASE = "angle_offset", "base_tilt"
 
 
 def session(method: str = "joint", **options: Any) -> Any:
-    fit = choose._SessionFit(observed(), SolveOptions(**options), cast(Any, method),
+    fit = SessionFit(observed(), SolveOptions(**options), cast(Any, method),
                              None)  # fmt: skip
     return cast(Any, fit)
 
@@ -56,7 +57,7 @@ def test_rates_of_the_earth_of_the_three_models() -> None:
     options = SolveOptions(heading_deg=1.0)
     earth = 7.292115e-5
     said, another, none = (
-        choose._SessionFit(seen, options, "joint", None, cast(Any, model))
+        SessionFit(seen, options, "joint", None, cast(Any, model))
         for model in ("stated", "another", "none")
     )
     unsure = earth * np.cos(0.7) * np.deg2rad(1.0)
@@ -133,7 +134,7 @@ def test_positions_that_do_not_show_the_tilt_take_the_base_for_level() -> None:
     found, (note,) = best_of(open_, open_)
     assert found == "level"
     assert note == "these positions do not show the tilt, so the base is taken as level"
-    few = choose._SessionFit(
+    few = SessionFit(
         observe(TWO_POSITIONS, outputs(TWO_POSITIONS)), SolveOptions(), "joint", None
     )
     assert few._level_assumed_note().startswith(f"{note}; add α = ")
@@ -164,14 +165,14 @@ def test_rows_beyond_those_of_the_windows_are_fitted_again() -> None:
 def test_what_a_tilt_has_to_leave_determined(
     undetermined: tuple[str, ...], all_of_them: bool
 ) -> None:
-    assert choose._determines_all(fitted(0.0, undetermined=undetermined)) == all_of_them
+    assert determines_all(fitted(0.0, undetermined=undetermined)) == all_of_them
 
 
 def test_without_any_means_nothing_is_determined() -> None:
     nothing = SimpleNamespace(dof=0, chi2=0.0)
     empty = estimate([], np.zeros(0), np.zeros((0, 0)), acc=cast(Any, nothing))
-    assert not choose._determines_all(empty)
-    assert choose._determines_all(fitted(0.0, acc=nothing))
+    assert not determines_all(empty)
+    assert determines_all(fitted(0.0, acc=nothing))
 
 
 def over_rates(
@@ -195,7 +196,7 @@ def over_rates(
         favoured = gain > np.log(1e-3)
         shown = SimpleNamespace(gain=gain, other_favoured=favoured)
     measured = SimpleNamespace(of=lambda *told: shown)
-    monkeypatch.setattr(choose, "_SessionFit", Session)
+    monkeypatch.setattr(choose, "SessionFit", Session)
     monkeypatch.setattr(choose, "VerticalEarthRate", measured)
     found, notes = choose._fit_over_earth_rates(
         observed(), SolveOptions(), "joint", None

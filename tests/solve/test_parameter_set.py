@@ -17,7 +17,7 @@ from fieldcal.core.positions import (
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.basis import RowView
 from fieldcal.model.causes.detents import detent_rotations as turned_alike
 from fieldcal.model.causes.detents import detents
 from fieldcal.physics.experience import Experience

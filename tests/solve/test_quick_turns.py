@@ -15,7 +15,7 @@ from fieldcal.cli import main
 from fieldcal.core.frames import direction_cosines
 from fieldcal.core.samples import Block
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import PreparedSession
+from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 

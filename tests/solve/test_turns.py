@@ -28,7 +28,7 @@ from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import PreparedSession
+from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_session as solve_session
 from fieldcal.model.turns import rotation
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns

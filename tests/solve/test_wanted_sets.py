@@ -18,9 +18,10 @@ from fieldcal.core.positions import (
     Position,
     specific_forces,
 )
-from fieldcal.solve import choose, solve
+from fieldcal.solve import session_fit, solve
 from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.parameter_set import ParameterSetOptions
+from fieldcal.solve.session_fit import SessionFit
 
 TABLE = Position("table", 0.0, 0.0, rate=(0.0, 0.0, 0.5))
 
@@ -54,7 +55,7 @@ def by_grade(
         asked.append(wanted.factory)
         return first if len(asked) == 1 else fine
 
-    monkeypatch.setattr(choose, "estimate_parameters", estimated)
+    monkeypatch.setattr(session_fit, "estimate_parameters", estimated)
     found = session(factory=COARSER, **options)._fit("none")
     return ("coarse" if found is first else found), asked
 
@@ -89,7 +90,7 @@ def wanted(
     **options: Any,
 ) -> ParameterSetOptions:
     """Contents of the set that a session fits."""
-    one: Any = choose._SessionFit(
+    one: Any = SessionFit(
         observed(places, **(known or {})), SolveOptions(**options), cast(Any, method),
         None,
     )  # fmt: skip
@@ -102,7 +103,7 @@ def wanted(
         assert turning == (turns if averaged else None)
         given.append(content)
 
-    monkeypatch.setattr(choose, "estimate_parameters", estimated)
+    monkeypatch.setattr(session_fit, "estimate_parameters", estimated)
     one._fit(*asked)
     assert given[0].earth == one.earth_sigma
     return given[0]

@@ -14,8 +14,8 @@ from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import SIX_FACES, Position
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
+from fieldcal.model.causes.basis import RowView
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.effect_causes import effect_causes
 from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.evidence.sizing import Member

@@ -29,7 +29,7 @@ from fieldcal.against.wording import paragraph
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Block
 from fieldcal.diagnosis.result import Quantity
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.rows.reference import MIN_CHANNEL_SAMPLES, Reference
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.search.set_at_instability import with_typical_calibration

@@ -16,7 +16,7 @@ import numpy as np
 from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.motion_dictionary import MotionDictionary
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.coloured_noise import Bands

@@ -19,7 +19,7 @@ from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 
 
 def free_calibration_sizes(found: MotionExplanation, sizes: Array) -> Array:

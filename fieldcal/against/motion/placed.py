@@ -14,7 +14,7 @@ from fieldcal.against.result import Aligned, Difference, RealAndSimulated
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model import priors, thresholds
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 
 PPM = 1e6
 

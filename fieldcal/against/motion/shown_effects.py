@@ -14,7 +14,7 @@ from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.posterior.probabilities import ProbableCause
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Index
-from fieldcal.model.causes.columns import Course, General
+from fieldcal.model.causes.basis import Course, General
 from fieldcal.physics.effect import Effect
 
 Basis = Course | General

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes import columns, smooth
+from fieldcal.model.causes.basis import Course, General
 from fieldcal.model.causes.cause import Basis
-from fieldcal.model.causes.columns import Course, General
 from fieldcal.model.causes.wander import Wander
 from fieldcal.physics.experience import Experience
 

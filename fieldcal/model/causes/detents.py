@@ -9,8 +9,8 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes import columns
+from fieldcal.model.causes.basis import CentralDifference, General
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General
 from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.joint_turns import ANGLE_TOLERANCE_RAD
@@ -60,7 +60,7 @@ def detent_columns(table: ColumnTable, shared: Sequence[Detent]) -> Index:
     """Append a column, rad, for the error of each detent; their indices, (m,)."""
     rotations = detent_rotations(shared, table.position_count)
 
-    def sides(plain: Experience, state: State) -> Iterator[columns.CentralDifference]:
+    def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
         """Inputs for a change of each detent's error, a step up and down."""
         small = state.small_rotation
         for column in rotations.T:

@@ -21,9 +21,9 @@ from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
+from fieldcal.model.causes.basis import Course, General
 from fieldcal.model.causes.cause import CLOSURE, MIN_WINDOWS, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import Course, General
 from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
 from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns

@@ -11,9 +11,13 @@ import numpy as np
 from fieldcal.core.factory import WARM_UP_TIME_CONSTANT, WARMING_EFFECTS, FactoryErrors
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
-from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
 from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.effect_columns import (
+    bias_change_basis,
+    effect_basis,
+    separable_basis,
+)
 from fieldcal.model.causes.hysteresis import hysteresis
 from fieldcal.physics.effect import (
     NO_SHAPE,
@@ -158,15 +162,15 @@ def effect_columns(
     """Append the columns of an effect; indices (k,) for each grid point."""
     count = len(effect.params)
     if isinstance(effect, BiasChange):
-        course = columns.bias_change_basis(effect, grid)
+        course = bias_change_basis(effect, grid)
         start = table.add(course, 6 * len(grid))
         channel = np.array([CHANNELS.index(p.name) for p in effect.params])
         return [start + channel * len(grid) + i for i in range(len(grid))]
     if isinstance(effect, Separable):
-        start = table.add(columns.separable_basis(effect, grid), count * len(grid))
+        start = table.add(separable_basis(effect, grid), count * len(grid))
         return [start + i * count + np.arange(count) for i in range(len(grid))]
     return [
-        table.add(columns.effect_basis(effect, *point), count) + np.arange(count)
+        table.add(effect_basis(effect, *point), count) + np.arange(count)
         for point in grid
     ]
 

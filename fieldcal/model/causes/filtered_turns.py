@@ -27,9 +27,9 @@ import numpy as np
 from fieldcal.core.derivative import derivative
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General, RowView
 
 FILTERED = "bandwidth"
 """Part of the group; the id of the effect of such filters in the catalogue."""

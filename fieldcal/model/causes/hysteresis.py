@@ -15,9 +15,9 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General, RowView
 
 
 def hysteresis(table: ColumnTable, size: float) -> Group:

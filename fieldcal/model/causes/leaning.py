@@ -23,9 +23,9 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.state import perpendicular_vectors
 
 

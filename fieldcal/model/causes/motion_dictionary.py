@@ -14,8 +14,8 @@ import numpy as np
 
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import effect_causes
 from fieldcal.model.causes.unknown_causes import unknown_causes

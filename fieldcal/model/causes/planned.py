@@ -17,7 +17,8 @@ from fieldcal.core.positions import Position, alpha_beta_angles, gamma_angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
-from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.basis import RowView
+from fieldcal.model.causes.effect_columns import effect_basis
 from fieldcal.model.state import State, Term
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.physics.experience import Experience
@@ -70,7 +71,7 @@ def predict_outputs(
     view = RowView.of(x, np.zeros((1, len(x))), state)
     parts = {"acc_bias": columns.bias(view), "acc_scale": columns.scale(view)}
     for term in state.terms:
-        parts[term.effect.id] = columns.effect_basis(term.effect, {}, 0).evaluate(view)
+        parts[term.effect.id] = effect_basis(term.effect, {}, 0).evaluate(view)
     slope = np.stack([_column(parts, n)[:, :3] for n in names], axis=2)
     return state.output(view.x, view.since)[:, :3], slope
 

@@ -23,9 +23,10 @@ from numpy.polynomial.legendre import legvander
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General, RowView, effect_basis
+from fieldcal.model.causes.effect_columns import effect_basis
 from fieldcal.physics.experience_rows import select_rows
 
 NAME = "sinking"

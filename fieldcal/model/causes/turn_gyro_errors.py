@@ -19,9 +19,9 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General, RowView
 
 MIN_TURNS = 3
 """Number of turns from which an error of one of them can be recognised."""

@@ -14,7 +14,7 @@ for the residuals,
     [L 0; l^T r] [L 0; l^T r]^T = 1 + S T S,    l = L^-1 S b                        (2)
     ln Z = (1 - r^2 - ln |R|) / 2 - ln |L|                                          (3)
 
-is (2) of `gram`. After the elimination of the set, the further columns have
+is (1) of `eliminated`. After the elimination of the set, the further columns have
 
     N = L^-1 S R,    M' = M - N^T N,    c' = c - N^T l                              (4)
 """

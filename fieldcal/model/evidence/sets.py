@@ -24,7 +24,8 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Eliminated, Gram, WeightedGram
+from fieldcal.model.evidence.eliminated import Eliminated
+from fieldcal.model.evidence.gram import Gram, WeightedGram
 from fieldcal.model.evidence.sizing import Member, Sizes, Sizing, instability_log_prior
 
 SetKey = tuple[tuple[str, int], ...]

@@ -6,7 +6,7 @@ import numpy as np
 
 from fieldcal.core.samples import Index
 from fieldcal.model import priors
-from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
+from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sizing import LOG_DENSITY, LOG_SIZE_STEP, gain_terms
 
 REFINED_SIZES = 129
@@ -22,7 +22,7 @@ def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, f
 
     `at` are the indices of its columns in the state, `v` its size there. The
     information on ln v is twice the sum of the squares of the shares lambda v^2 /
-    (1 + lambda v^2), lambda of (3) of `gram`.
+    (1 + lambda v^2), lambda of (2) of `eliminated`.
     """
     strength, power = gain_terms(state, at, v)
     near = v * np.exp(np.linspace(-LOG_SIZE_STEP, LOG_SIZE_STEP, REFINED_SIZES))

@@ -3,8 +3,8 @@
 Once a set is eliminated with sizes v_0, its covariance gives the evidence at any other
 size of one group: with C = U diag(c) U^T the posterior covariance of the group in units
 of its prior covariance, lambda = (1 / c - 1) / v_0^2 and q = U^T u / (c v_0) are those
-of (3) of `gram`. The same holds for an instability tau of the means of windows: if the
-information on the means with tau has the eigenvalues s, that without tau has the
+of (2) of `eliminated`. The same holds for an instability tau of the means of windows:
+if the information on the means with tau has the eigenvalues s, that without tau has the
 eigenvalues s / (1 - tau^2 s).
 """
 
@@ -21,7 +21,8 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Eliminated, Gram, gains_from_eigenvalues
+from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
+from fieldcal.model.evidence.gram import Gram
 
 LOG_DENSITY = np.log(priors.density())
 INSTABILITY_LOG_DENSITY = np.log(priors.density(priors.INSTABILITY_TAIL))

@@ -3,7 +3,7 @@
 Biases larger than the stated grade allows make the errors of a coarser grade likely,
 but not certain: a device with gyroscope biases of 5 deg/s may have accelerometers as
 linear as those of tactical grade. Each kind of error has the size s_1 of the stated
-grade or s_2 of the coarser one. With gain(v) by (3) of `gram`, and the prior
+grade or s_2 of the coarser one. With gain(v) by (2) of `eliminated`, and the prior
 probability AS_STATED of the stated grade, the probabilities of the two sizes have the
 ratio
 
@@ -22,7 +22,7 @@ from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import CHANNELS, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
+from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sizing import gain_terms
 
 NONLINEARITIES = ("quadratic", "scale_asymmetry", "cubic")

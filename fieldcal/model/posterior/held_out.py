@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows

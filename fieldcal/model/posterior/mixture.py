@@ -25,7 +25,8 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Gram, evidence_gains
+from fieldcal.model.evidence.eliminated import evidence_gains
+from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.levels import InstabilityScan, scan_instabilities
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import (

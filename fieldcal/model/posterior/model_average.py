@@ -28,7 +28,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.common_axes import (

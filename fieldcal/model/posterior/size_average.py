@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.posterior.mixture import Mixing
 from fieldcal.model.search.set_at_instability import with_typical_calibration

@@ -150,46 +150,103 @@ def reduce_to_rows(
         further row, its last, for the gyroscopes
 
     """
-    block, rate = masked(source.block, source.usable), source.rate
-    windows = window_bounds(block, source.about)
-    held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
-    shaken = source.window_noise
+    block = masked(source.block, source.usable)
+    cut = _CutWindows.of(source, block, whole, apart)
+    out = _average_windows(source, cut, level)
+    off, alike = _errors_of_values(block, cut.windows, out.y, cut.rows)
+    off = _with_errors_of_site(source, out.x, off, len(cut.windows) > 1)
+    if apart:
+        ends = np.zeros(len(off), dtype=bool)
+        ends[np.cumsum(cut.rows) - 1] = True
+        out.sd[ends, :3] = np.nan
+        out.sd[~ends, 3:] = np.nan
+    return replace(out, window_error=off, session_error=alike)
+
+
+@dataclass(frozen=True, slots=True)
+class _CutWindows:
+    """The w windows that have samples, cut into blocks.
+
+    Attributes
+    ----------
+    windows : (w, 2) first and one past the last sample of each window
+    position : (w,) index of each window's position
+    bounds : (r, 2) first and one past the last sample of the rows of each window
+
+    """
+
+    windows: NDArray[np.intp]
+    position: NDArray[np.intp]
+    bounds: list[NDArray[np.intp]]
+
+    @classmethod
+    def of(
+        cls, source: RowSource, block: Block, whole: bool, apart: bool
+    ) -> _CutWindows:
+        """Cut the windows of `block`, the source's samples that may be used.
+
+        `whole` and `apart` are those of `reduce_to_rows`.
+        """
+        windows = window_bounds(block, source.about)
+        held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
+        rate, without = source.rate, source.about.excluded_spans
+        bounds = []
+        for a, b in windows[held].tolist():
+            each = np.zeros((0, 2), dtype=np.intp)
+            if not whole:
+                each = block_bounds(block.t, (a, b), rate, len(held), without)
+            bounds.append(np.vstack([each, [(a, b)]]) if whole or apart else each)
+        return cls(windows[held], held, bounds)
+
+    @property
+    def rows(self) -> list[int]:
+        """Number of rows of each window."""
+        return [len(b) for b in self.bounds]
+
+
+def _average_windows(source: RowSource, cut: _CutWindows, level: Array | None) -> Rows:
+    """Average the blocks of windows, with the noise that the samples have.
+
+    `level` (6,) is the standard deviation of one sample; if None, that of each window,
+    and at least that of a base that sways.
+    """
+    shaken, rows = source.window_noise, cut.rows
     noise, levels = shaken.noise, shaken.levels
     if source.sway_noise is not None:
         noise, levels = (np.fmax(a, source.sway_noise) for a in (noise, levels))
     if level is not None:
-        noise, levels = level, np.tile(level, (len(held), 1))
-    source = replace(source, block=shaken.block)
-    without = source.about.excluded_spans
-    bounds = []
-    for a, b in windows[held].tolist():
-        each = np.zeros((0, 2), dtype=np.intp)
-        if not whole:
-            each = block_bounds(block.t, (a, b), rate, len(held), without)
-        bounds.append(np.vstack([each, [(a, b)]]) if whole or apart else each)
-    rows = [len(b) for b in bounds]
-    out = average_rows(
-        source,
-        np.concatenate(bounds),
-        np.repeat(held, rows),
+        noise, levels = level, np.tile(level, (len(cut.windows), 1))
+    return average_rows(
+        replace(source, block=shaken.block),
+        np.concatenate(cut.bounds),
+        np.repeat(cut.position, rows),
         np.repeat(levels, rows, axis=0),
         noise,
         np.repeat(shaken.variance, rows, axis=0),
     )
-    off, alike = _errors_of_values(block, windows[held], out.y, rows)
+
+
+def _with_errors_of_site(
+    source: RowSource, x: Experience, off: Array, turned: bool
+) -> Array:
+    """Add what sway and an unknown direction of the Earth's rate do to whole windows.
+
+    Parameters
+    ----------
+    x : inputs of the device in n rows
+    off : (n, 6) standard deviations of the other errors that all rows of a window
+        share, m/s^2 and rad/s
+    turned : whether there is more than one window
+
+    """
     if source.sway_variance is not None:
-        off = np.hypot(off, np.sqrt(source.sway_variance[out.x.position]))
+        off = np.hypot(off, np.sqrt(source.sway_variance[x.position]))
     # the direction of the Earth's rate is unknown in device axes, except in a device
     # that was never turned (bias contains it) or whose gyroscopes measure it
-    free = out.x.earth_unseen & (len(held) > 1)
+    free = x.earth_unseen & turned
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
-    if apart:
-        ends = np.zeros(len(off), dtype=bool)
-        ends[np.cumsum(rows) - 1] = True
-        out.sd[ends, :3] = np.nan
-        out.sd[~ends, 3:] = np.nan
-    return replace(out, window_error=off, session_error=alike)
+    return off
 
 
 def _errors_of_values(

@@ -14,7 +14,8 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
-from fieldcal.model.evidence.gram import WeightedGram, evidence_gains
+from fieldcal.model.evidence.eliminated import evidence_gains
+from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.search.instabilities import InstabilityIndices
 from fieldcal.model.search.set_at_instability import SetAtInstability

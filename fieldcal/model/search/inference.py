@@ -152,41 +152,42 @@ class Inference:
         for _ in range(MAX_LINEARISATIONS):
             visited.add(Sets.key(best.members))
             if best.members != members:
-                state, values, _ = fit.settle(state, values, best.members, best.sizes)
-                refinement = Refinement(fit, state, values, best.sizes)
-                members = refinement.refine_shapes(best.members)
-                # The columns of the shapes on the grid must leave the state. Otherwise
-                # what they explain is subtracted from the rows of turns twice.
-                state, values, best = fit.settle(state, values, members, best.sizes)
+                members, state, values, best = self._settle_refined(state, values, best)
             search = self._search_about(state, values, best)
             for other in earlier:
                 search.sets.evaluate(other)  # it may be as likely as what replaced it
             earlier[best.members] = None
-            best = search.run(members, thorough=False)
-            same = frozenset(c.key for c, _ in members)
-            if thorough and best.keys == same:
-                best = search.run(members)
-            if best.keys == same:
-                own = search.sets.evaluate(members, best.sizes)  # with its own shapes
-                # a point of the grid next to where a time constant was refined
-                returned = Sets.key(best.members) in visited
-                if best.score <= own.score + (
-                    TIME_CONSTANT_LOG_LOSS if returned else MIN_LOG_RISE
-                ):
-                    best = own
-                    next_state, next_values, _ = fit.settle(
-                        state, values, members, best.sizes
-                    )
-                    if fit.largest_step(best, values, next_values) < MAX_KEPT_STEP:
-                        break
-                    state, values = next_state, next_values
-                    continue
-            if Sets.key(best.members) in visited:
+            best = _search_from(search, members, thorough)
+            returned = Sets.key(best.members) in visited
+            own = _own_if_no_better(search, members, best, returned)
+            if own is None and returned:
                 break
+            if own is None:
+                continue
+            best = own
+            next_state, next_values, _ = fit.settle(state, values, members, best.sizes)
+            if fit.largest_step(best, values, next_values) < MAX_KEPT_STEP:
+                break
+            state, values = next_state, next_values
         return InferenceResult(
             fit, search, best, state, fit.pad(values), fit.turn_rows,
             fit.contradicted_turns, frozenset(visited),
         )  # fmt: skip
+
+    def _settle_refined(
+        self, state: State, values: Array, best: Set
+    ) -> tuple[tuple[Member, ...], State, Array, Set]:
+        """Refine the shapes of a set; its members, and the estimate with them.
+
+        The estimate is the state, the values (k,) of the dictionary's columns in it,
+        and the set about it.
+        """
+        state, values, _ = self.fit.settle(state, values, best.members, best.sizes)
+        refinement = Refinement(self.fit, state, values, best.sizes)
+        members = refinement.refine_shapes(best.members)
+        # The columns of the shapes on the grid must leave the state. Otherwise
+        # what they explain is subtracted from the rows of turns twice.
+        return members, *self.fit.settle(state, values, members, best.sizes)
 
     def _search_from_nominal(
         self, state: State, values: Array, search: Search
@@ -205,3 +206,35 @@ class Inference:
                 turn_rows = self.fit.turn_rows
         self.fit.turn_rows = turn_rows
         return best
+
+
+def _search_from(search: Search, members: tuple[Member, ...], thorough: bool) -> Set:
+    """The best set, starting from a set with these members.
+
+    If `thorough`, costly changes are tried once cheap ones find no other causes.
+    """
+    best = search.run(members, thorough=False)
+    if thorough and best.keys == _causes(members):
+        return search.run(members)
+    return best
+
+
+def _own_if_no_better(
+    search: Search, members: tuple[Member, ...], best: Set, returned: bool
+) -> Set | None:
+    """The set with these members, with its own shapes, if the best is no better.
+
+    None if the best set has other causes, or shapes that are clearly likelier. If it
+    has `returned` to a set visited before, it may be the point of the grid next to
+    which a time constant was refined.
+    """
+    if best.keys != _causes(members):
+        return None
+    own = search.sets.evaluate(members, best.sizes)
+    rise = TIME_CONSTANT_LOG_LOSS if returned else MIN_LOG_RISE
+    return own if best.score <= own.score + rise else None
+
+
+def _causes(members: Sequence[Member]) -> frozenset[str]:
+    """Keys of the causes of some members."""
+    return frozenset(cause.key for cause, _ in members)

@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import Cause
 from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.instabilities import InstabilityIndices

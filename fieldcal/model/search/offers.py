@@ -16,7 +16,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.smooth import MAX_COSINES
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, SetKey, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, Sizes
 from fieldcal.model.search.group_gains import GroupGains

@@ -1,7 +1,7 @@
 """Pairs of causes, which may explain rows that neither explains by itself.
 
-The sizes of groups i and j, added to a set, are found in turn by (3) of `gram`, each
-with the other at its most probable size: the size found for one alone is too large
+The sizes of groups i and j, added to a set, are found in turn by (2) of `eliminated`,
+each with the other at its most probable size: the size found for one alone is too large
 where both are present. With M_jj = U diag(lambda) U^T and q = U^T b_j, the matrix and
 vector of i after the elimination of j at size v are
 
@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import (
+from fieldcal.model.evidence.eliminated import (
     MIN_EIGENVALUE,
     Eliminated,
     evidence_gains,

@@ -24,11 +24,11 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
-from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.unknown_causes import typical_unknown_sizes
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 
 

@@ -14,7 +14,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Sizes
 from fieldcal.model.search.instabilities import InstabilityIndices, tried_instabilities

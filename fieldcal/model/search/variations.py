@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import LOG_DENSITY, Member
 

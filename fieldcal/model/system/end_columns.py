@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.causes.columns import General
+from fieldcal.model.causes.basis import General
 from fieldcal.model.state import State
 from fieldcal.model.turns.attitude import (
     closures,

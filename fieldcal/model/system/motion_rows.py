@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import ACC, GYR, Array, Index
+from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.cause import TRIADS
-from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.causes.motion_dictionary import MotionDictionary
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.model.state import State

@@ -7,13 +7,13 @@ once, except those that need a whole turn, or that change its ends.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.causes.columns import Course, General, RowView
+from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.system.end_columns import EndColumns
@@ -81,6 +81,66 @@ class _TurnColumnsBuilder:
         return TurnColumns(np.concatenate(self.index), closing, self.general)
 
 
+@dataclass(frozen=True, slots=True)
+class _AllTurns:
+    """Adds the columns of a basis to all turns at once.
+
+    Attributes
+    ----------
+    builders : one for each turn
+    every : the n edges of all turns, one turn after the other
+    cut : first edge of each turn but the first
+    dictionary : of the columns
+    known : set fitted to the windows, if accelerometers during turns are used; or None
+
+    """
+
+    builders: list[_TurnColumnsBuilder]
+    every: RowView
+    cut: Index
+    dictionary: Dictionary
+    known: Set | None
+
+    def split(self, table: Array) -> Iterator[tuple[_TurnColumnsBuilder, Array]]:
+        """The builder of each turn, with the rows of a table (n, ...) at its edges."""
+        return zip(self.builders, np.split(table, self.cut), strict=True)
+
+    def add_course(self, first: int, course: Course) -> None:
+        """Add the columns of a course, of which `first` is the first."""
+        if self.dictionary.unoriented.any():  # rotates the force at the ends
+            for builder in self.builders:
+                builder.no_closing(first + np.arange(3 * course.width))
+        if course.timed:
+            for builder, table in self.split(course.evaluate(self.every)):
+                builder.course(first, table)
+        elif course.while_output_stands:
+            for builder in self.builders:
+                if builder.turn.standing_share is not None:
+                    even = np.ones((len(builder.view.x), 1))
+                    builder.course(first, even, builder.turn.standing_share)
+
+    def add_end_columns(self, ends: EndColumns) -> None:
+        """Add the columns of a basis that changes the inputs in positions."""
+        for builder in self.builders:
+            columns, outputs, bent = ends.columns_for(
+                builder.turn, builder.view.state.scale
+            )
+            builder.general_form(columns, outputs, bent)
+            if self.known is not None:
+                kept = turn_force_columns(columns, self.dictionary, self.known)
+                builder.general.append((columns[kept], outputs[:, :, kept]))
+
+    def add_outputs(self, first: int, table: Array) -> None:
+        """Add columns by their outputs (n, 6, k); `first` is the first of them."""
+        columns = first + np.arange(table.shape[2])
+        for builder, part in self.split(table):
+            builder.general_form(columns, part)
+        if self.known is not None:
+            kept = turn_force_columns(columns, self.dictionary, self.known)
+            for builder, part in self.split(table[:, :, kept]):
+                builder.general.append((columns[kept], part))
+
+
 def columns_of_turns(
     turns: Sequence[Turn],
     views: Sequence[RowView],
@@ -100,44 +160,17 @@ def columns_of_turns(
     """
     if not turns:
         return []
-    builders = [_TurnColumnsBuilder(t, v) for t, v in zip(turns, views, strict=True)]
     every = _concatenate(views)
     cut = np.cumsum([len(view.x) for view in views])[:-1]
+    builders = [_TurnColumnsBuilder(t, v) for t, v in zip(turns, views, strict=True)]
+    collected = _AllTurns(builders, every, cut, dictionary, known)
     for first, basis in dictionary.bases:
         if isinstance(basis, Course):
-            if dictionary.unoriented.any():  # rotates the force at the ends
-                for builder in builders:
-                    builder.no_closing(first + np.arange(3 * basis.width))
-            if basis.timed:
-                for builder, course in zip(
-                    builders, np.split(basis.evaluate(every), cut), strict=True
-                ):
-                    builder.course(first, course)
-            elif basis.while_output_stands:
-                for builder in builders:
-                    if builder.turn.standing_share is not None:
-                        even = np.ones((len(builder.view.x), 1))
-                        builder.course(first, even, builder.turn.standing_share)
-            continue
-        if first in at_ends:
-            for builder in builders:
-                columns, outputs, bent = at_ends[first].columns_for(
-                    builder.turn, builder.view.state.scale
-                )
-                builder.general_form(columns, outputs, bent)
-                if known is not None:
-                    kept = turn_force_columns(columns, dictionary, known)
-                    builder.general.append((columns[kept], outputs[:, :, kept]))
-            continue
-        table = _outputs(basis, views, every)
-        columns = first + np.arange(table.shape[2])
-        for builder, part in zip(builders, np.split(table, cut), strict=True):
-            builder.general_form(columns, part)
-        if known is not None:
-            kept = turn_force_columns(columns, dictionary, known)
-            parts = np.split(table[:, :, kept], cut)
-            for builder, part in zip(builders, parts, strict=True):
-                builder.general.append((columns[kept], part))
+            collected.add_course(first, basis)
+        elif first in at_ends:
+            collected.add_end_columns(at_ends[first])
+        else:
+            collected.add_outputs(first, _outputs(basis, views, every))
     return [builder.met() for builder in builders]
 
 

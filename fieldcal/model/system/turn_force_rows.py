@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
-from fieldcal.model.causes.columns import Course, RowView
+from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.sets import Set

@@ -18,8 +18,8 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import triads_of
-from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.rows.hand_tremor import turned_force

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.causes.columns import Course, RowView
+from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State

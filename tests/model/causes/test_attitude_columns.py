@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from small_sessions import LADDER, ladder, nominal
 
 from fieldcal.core.frames import earth_rate_at_home
-from fieldcal.model.causes.columns import RowView, attitude
+from fieldcal.model.causes.basis import RowView
+from fieldcal.model.causes.columns import attitude
 from fieldcal.physics.experience import Experience
 
 SCALE = np.array([1.1, 0.9, 1.05, 1.02, 0.97, 1.01])

@@ -7,7 +7,7 @@ import pytest
 from small_sessions import LADDER, G, dictionary, ladder, nominal
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.detents import (
     Detent,
     detent_columns,

@@ -13,8 +13,8 @@ from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import columns, smooth
+from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
-from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander import Wander

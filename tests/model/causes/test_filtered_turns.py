@@ -8,7 +8,7 @@ import numpy as np
 from small_sessions import G, dictionary, ladder, nominal
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.priors import FILTERED_S
 from fieldcal.physics.experience import Experience

@@ -7,8 +7,8 @@ import pytest
 from small_sessions import LADDER, G, dictionary, ladder, nominal
 
 from fieldcal.core.samples import Array
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.hysteresis import hysteresis
 from fieldcal.physics.experience import Experience
 

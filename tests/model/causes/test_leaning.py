@@ -13,7 +13,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.findings.found_effects import parameter_estimates
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.leaning import leaning
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.lean_modes import lean_modes

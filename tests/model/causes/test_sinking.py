@@ -18,7 +18,7 @@ from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.wording.paragraph import notes
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
-from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.sinking import NAME, sinking
 from fieldcal.session.description import parse_description
 from fieldcal.session.folder import Session

@@ -18,7 +18,7 @@ from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.wording.paragraph import notes
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
-from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.turn_gyro_errors import turn_gyro_errors
 from fieldcal.physics.experience_rows import select_rows
 from fieldcal.session.description import parse_description

@@ -8,7 +8,7 @@ from gram_cases import TAU, WIDTH, case
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import CLOSURE
-from fieldcal.model.evidence.gram import Eliminated, evidence_gains
+from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
 from fieldcal.model.priors import SIZES
 
 FREE = pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])

@@ -11,7 +11,7 @@ from small_sessions import Session, ladder
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
+from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.size_between import (
     most_probable_axis_size,

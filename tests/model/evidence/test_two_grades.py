@@ -11,7 +11,7 @@ from gram_cases import TAU, case
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.two_grades import chances_of_coarser
 
 SET = np.array([0, 3, 4, 7])

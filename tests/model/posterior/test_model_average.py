@@ -11,7 +11,7 @@ from small_sessions import Session, ladder
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.posterior.model_average import (

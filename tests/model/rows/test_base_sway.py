@@ -19,7 +19,8 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.evaluation.observations import usable_windows
-from fieldcal.evaluation.solution import PreparedSession, solve_session
+from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.rows.base_sway import find_base_sway
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors

@@ -13,7 +13,7 @@ from small_sessions import Session, ladder
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.priors import SIZES

@@ -12,7 +12,8 @@ from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
-from fieldcal.model.causes.columns import General
+from fieldcal.model.causes.basis import General
+from fieldcal.model.causes.effect_columns import effect_basis
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.turns.attitude import turn_geometry
@@ -81,7 +82,7 @@ def test_small_rotations_are_met_at_both_ends_and_nowhere_else(x: Experience) ->
 
 def test_an_effect_is_met_at_both_ends_at_once() -> None:
     effect = catalogue()["angle_offset"]
-    basis, one = columns.effect_basis(effect, {}, 0), turn(ALL)
+    basis, one = effect_basis(effect, {}, 0), turn(ALL)
     at, outputs, moved = EndColumns.of(40, basis, ALL, STATE).columns_for(one, SCALE)
     np.testing.assert_array_equal(at, [40, 41])
     for k in range(2):

@@ -10,7 +10,7 @@ import pytest
 from benchmarks.concealed import kinds
 from fieldcal.diagnosis.explain import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.basis import RowView
 from fieldcal.model.system import turn_rows
 from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
 from fieldcal.model.turns.turn import Turn

@@ -10,8 +10,8 @@ from small_sessions import dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
-from fieldcal.model.causes import columns
-from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.basis import RowView
+from fieldcal.model.causes.effect_columns import effect_basis
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.state import Term
 from fieldcal.model.system import turn_force_rows, turn_rows
@@ -127,7 +127,7 @@ def test_columns_on_the_way_are_what_an_effect_changes_there() -> None:
     coupling = Term(EFFECTS["cross_coupling"], np.linspace(-0.02, 0.03, 6))
     state = replace(nominal(), scale=np.linspace(0.9, 1.2, 6), terms=(coupling,))
     x, since = replace(X, w=w, w_dot=0.3 * w[::-1]), X.since_turn[None]
-    found = columns.effect_basis(effect, {}, 0).evaluate(RowView(x, x, since, state))
+    found = effect_basis(effect, {}, 0).evaluate(RowView(x, x, since, state))
     for j, step in enumerate(1e-4 * np.eye(3)):
         up, down = (state.output(effect.change(x, s), since) for s in (step, -step))
         np.testing.assert_allclose(found[:, :, j], (up - down) / 2e-4, atol=1e-6)

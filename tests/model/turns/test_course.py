@@ -12,7 +12,7 @@ from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
-from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.basis import RowView
 from fieldcal.model.state import State, Term
 from fieldcal.model.turns.turn import Turn
 from fieldcal.model.turns.turn_tracker import apply_way_effects, other_gyro_errors

@@ -11,8 +11,8 @@ import pytest
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
+from fieldcal.model.causes.basis import RowView
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.filtered_turns import FILTERED
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.posterior.held_out import held_out_turn_residuals

@@ -1,0 +1,143 @@
+"""The evidence of a set of columns, and what one more group adds to it.
+
+With G = Phi^T R^-1 Phi and b = Phi^T R^-1 (y - h) of all rows, weighted at an
+instability (`gram`), and S the prior standard deviations v T of a set's columns,
+
+    ln Z = b^T S (I + S G S)^-1 S b / 2 - ln |I + S G S| / 2 - ln |R| / 2           (1)
+
+and for one more group k, after the set is eliminated, with M = U diag(lambda) U^T the
+Schur complement of T G T and q = U^T T b',
+
+    gain(v) = sum_j [ v^2 q_j^2 / (1 + v^2 lambda_j) - ln(1 + v^2 lambda_j) ] / 2   (2)
+
+The only approximation is the grid of v. Source: M. Tipping and A. Faul, Fast marginal
+likelihood maximisation for sparse Bayesian models, 2003.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
+from fieldcal.model.evidence.gram import WeightedGram
+from fieldcal.model.priors import SIZES
+
+MIN_EIGENVALUE = 1e-9
+"""Relative size of an eigenvalue below which it is a rounding error."""
+
+
+@dataclass(frozen=True)
+class Eliminated:
+    """A set of columns with their prior sizes, eliminated: its posterior.
+
+    Attributes
+    ----------
+    rows : weighted Gram matrix
+    columns : (a,) of the dictionary; a column may occur twice
+    prior_sigma : (a,) prior standard deviation of each
+    half : (a, a) root H of the posterior covariance H^T H
+    estimate : (a,) posterior mean
+    score : ln Z, (1)
+
+    """
+
+    rows: WeightedGram
+    columns: Index
+    prior_sigma: Array
+    half: Array
+    estimate: Array
+    score: float
+
+    @classmethod
+    def of(cls, rows: WeightedGram, columns: Index, sizes: Array) -> Eliminated:
+        """Eliminate columns with prior standard deviations `sizes`."""
+        scaled = rows.matrix(columns, columns) * sizes
+        scaled *= sizes[:, None]
+        scaled.flat[:: len(columns) + 1] += 1.0
+        root = cholesky_root(scaled)
+        half = triangular_inverse(root) * sizes
+        projected = half @ rows.rhs(columns)
+        score = 0.5 * (float(projected @ projected) - rows.square - rows.log_det)
+        score -= float(np.log(np.diag(root)).sum())  # (1)
+        return cls(rows, columns, sizes, half, half.T @ projected, score)
+
+    def places_of(self, columns: Index) -> Index:
+        """Indices of columns in the set; of one that occurs twice, the last.
+
+        The columns of a member come after those of the groups that are always in.
+        """
+        places = [int(np.flatnonzero(self.columns == c)[-1]) for c in columns]
+        return np.array(places, dtype=np.intp)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Posterior covariance S (I + S G S)^-1 S, (a, a)."""
+        out: Array = self.half.T @ self.half
+        return out
+
+    def schur_complement(self, columns: Index, typical: Array) -> tuple[Array, Array]:
+        """M and T b' of further columns after elimination, in typical sizes."""
+        shared = self.rows.matrix(self.columns, columns)
+        inner = self.rows.matrix(columns, columns)
+        taken = self.half @ shared
+        inner -= taken.T @ taken
+        rhs = self.rows.rhs(columns) - shared.T @ self.estimate
+        return inner * typical * typical[:, None], rhs * typical
+
+    def schur_complement_of_means(self, kind: int) -> tuple[Array, Array]:
+        """The same for an offset of each mean of one kind of instability.
+
+        `kind` is its index 0 to 6; the offsets are in outputs.
+        """
+        white = self.rows.shared(kind)
+        ours = self.rows.white[:, self.rows.gram.index[self.columns]]
+        shared = ours.T @ white
+        taken = self.half @ shared
+        inner = white.T @ white - taken.T @ taken
+        return inner, white.T @ self.rows.residual - shared.T @ self.estimate
+
+    def gain_by_size(self, columns: Index, typical: Array) -> Array:
+        """Gain of ln Z by a further group, at each of its sizes, (2)."""
+        own = np.diag(self.rows.matrix(columns, columns)) * typical**2
+        return evidence_gains(
+            *self.schur_complement(columns, typical), float(own.max())
+        )
+
+
+def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
+    """Gain (2) at each of `SIZES` for groups of equal width: (..., k, k), (..., k).
+
+    `own` (...) is the largest diagonal element of T G T before the elimination.
+    """
+    if rhs.shape[-1] == 1:
+        strength, power = inner[..., 0], rhs**2
+    else:
+        strength, axes = np.linalg.eigh(inner)
+        power = (np.swapaxes(axes, -1, -2) @ rhs[..., None])[..., 0] ** 2
+    determined = strength > MIN_EIGENVALUE * np.maximum(
+        np.asarray(own)[..., None], 1e-300
+    )
+    strength, power = (
+        np.where(determined, strength, 0.0),
+        np.where(determined, power, 0.0),
+    )
+    return gains_from_eigenvalues(strength, power)
+
+
+def gains_from_eigenvalues(
+    strength: Array, power: Array, sizes: Array = SIZES
+) -> Array:
+    """Gain (2) at some sizes, from lambda and q^2, (..., k) each."""
+    square = sizes**2
+    # sizes are the last axis: numpy is slow at sums over a last axis of few elements
+    ratio = strength[..., None] * square
+    ratio += 1
+    gain = power[..., None] * square
+    gain /= ratio
+    gain -= np.log(ratio, out=ratio)
+    total: Array = 0.5 * gain.sum(axis=-2)
+    return total

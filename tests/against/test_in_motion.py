@@ -187,6 +187,14 @@ def test_the_butterworth_filter_of_a_simulator_is_one_below_nothing() -> None:
         assert abs(tau + 0.03) < 4 * sigma < 0.006
 
 
+def test_a_long_delay_is_no_filter_of_either_triad() -> None:
+    """About no filter the one is as linear as the other; fits of their own tell."""
+    one, found, _ = compared(43, 34_400)
+    assert one.kind == "time_delay"
+    assert {d.id for d in found.differences} - CALIBRATION == {"time_delay"}
+    assert np.abs(pulls(one, found)).max() < 4.5
+
+
 @pytest.mark.thorough
 def test_a_mount_as_soft_along_every_axis_is_nearly_a_filter() -> None:
     """To second order it is the inverse of a low-pass, and a delay."""

@@ -86,6 +86,10 @@ class MotionFit:
             self.system = system
         return found
 
+    def hold(self, members: Sequence[Member]) -> InferenceResult:
+        """The result with some causes, about their own state."""
+        return Inference(GaussNewton(self.system, self.nominal)).hold(members)
+
     def copy(self) -> Self:
         """A copy with columns, rows and noise of its own."""
         dictionary = MotionDictionary(self.rows, np.abs(self.nominal.scale))

@@ -8,6 +8,7 @@ alignment is a column of every fit, so its uncertainty is part of all results.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,7 @@ from fieldcal.model.rows.motion import (
     rows_in_motion,
 )
 from fieldcal.model.rows.reference import Reference
+from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.search.variations import ALTERNATIVE_MARGIN
 from fieldcal.model.state import State
 from fieldcal.model.system.motion_rows import MotionSystem
@@ -100,16 +102,40 @@ def explain_motion(
 
 
 def _explained(fit: MotionFit) -> MotionExplanation:
-    """Search from a fit, and repeat both with the causes found."""
+    """Search from a fit, and repeat both with the causes found.
+
+    A search is linear about its fit, where a filter is nearly a delay: it may end at
+    causes that a fit of their own makes less likely than those before. The likeliest
+    of the fits counts.
+    """
     found = fit.search(())
+    tried: list[_Start] = []
     for _ in range(MAX_SEARCHES):
+        fit = fit.copy()
         fit.settle(found.best.members)
         fit, members = _without_idle_lags(fit, found.best.members)
+        tried.append(_Start(fit, members, fit.evidence(members)))
         found = fit.search(members)
         if found.best.keys == fit.settled_keys:
             break
-    evidence = fit.evidence(found.best.members)
-    return MotionExplanation(fit, found, Posterior(found.search, found.best), evidence)
+    best = max(tried, key=lambda one: one.evidence)
+    if best is not tried[-1] or found.best.keys != best.fit.settled_keys:
+        found = best.fit.hold(best.members)
+    _correct_scores(found, best, tried)
+    posterior = Posterior(found.search, found.best)
+    return MotionExplanation(best.fit, found, posterior, best.evidence)
+
+
+def _correct_scores(
+    found: InferenceResult, best: _Start, tried: Sequence[_Start]
+) -> None:
+    """Give sets that had a fit of their own the evidence of that fit."""
+    sets = found.search.sets
+    for one in tried:
+        own = sets.evaluate(sets.dictionary.match_members(one.members))
+        if own.keys != found.best.keys and own.keys_in_state:
+            behind = best.evidence - one.evidence
+            sets.corrections[own.keys_in_state] = found.best.score - behind - own.score
 
 
 def _likely_starts(fit: MotionFit, dictionary: MotionDictionary) -> list[_Start]:

@@ -121,6 +121,19 @@ class Inference:
         state, values = self._state_without_causes()
         return self._iterate(state, values, better, False, before.visited_keys)
 
+    def hold(self, members: Sequence[Member]) -> InferenceResult:
+        """The result with some members of any dictionary, without a search."""
+        fit = self.fit
+        known = fit.dictionary.match_members(members)
+        state, values = self._state_without_causes()
+        state, values, best = fit.settle(state, values, known)
+        search = self._search_about(state, values, best)
+        best = search.sets.evaluate(known, best.sizes)
+        return InferenceResult(
+            fit, search, best, state, fit.pad(values), fit.turn_rows,
+            fit.contradicted_turns, frozenset(),
+        )  # fmt: skip
+
     def _state_without_causes(self) -> tuple[State, Array]:
         """The state at the estimate of the empty set, and its columns' values."""
         zeros: Array = np.zeros(self.fit.dictionary.width)

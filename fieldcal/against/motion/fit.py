@@ -100,7 +100,8 @@ class MotionFit:
     def evidence(self, members: tuple[Member, ...]) -> float:
         """Ln evidence of causes after `settle`, including that of the noise.
 
-        `members` are those that were settled, or more.
+        `members` need not be those that were settled: the effects of filters are
+        linear about these.
         """
         fit = GaussNewton(self.system, self.nominal)
         members = fit.dictionary.match_members(members)

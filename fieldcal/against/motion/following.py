@@ -61,6 +61,10 @@ FEWEST_S = 20.0
 MAX_SEARCHES = 3
 """Most searches."""
 
+LAG_ORDER = 3
+"""Highest power of its time constant that the effect of a filter is proportional to. A
+linear prediction of its absence is too large by this factor, chi^2 by its square."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Start:
@@ -188,6 +192,8 @@ def _without_idle_lags(
         if most is None:
             most = fit.evidence(members)
         others = tuple(m for m in members if m[0].key != member[0].key)
+        if most - fit.evidence(others) > LAG_ORDER**2 * ALTERNATIVE_MARGIN:
+            continue
         lean = fit.copy()
         lean.settle(others)
         if (left := lean.evidence(others)) >= most:

@@ -228,7 +228,7 @@ def explain(
         prepared.rows,
         fit.dictionary,
         windows,
-        found.values,
+        fit.pad(found.values),  # a resumed search has added columns, also if in vain
         average_over_sizes(found.search.sets, found.best),
     )
     enlarge_to_shown_grade(fit.dictionary, best.set, prepared.source.about)

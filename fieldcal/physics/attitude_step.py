@@ -31,6 +31,7 @@ class AttitudeStep(Separable):
 
     shapes = (Shape("at_s", "s", -np.inf, np.inf, "instant"),)
     seen_in = "time"
+    one_vector = True
 
     @abstractmethod
     def axes(self, x: Experience) -> Array:
@@ -43,6 +44,10 @@ class AttitudeStep(Separable):
     def applies(self, x: Experience) -> bool:
         """Where the angles of more than one position are known."""
         return len(np.unique(x.position[at_rest_in_known_position(x)])) > 1
+
+    def acts_on(self, x: Experience) -> bool:
+        """In any position: on the rows after it there, and on the turn that follows."""
+        return bool((x.position >= 0).any())
 
     def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """0 before the instant, 1 after it."""

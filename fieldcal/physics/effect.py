@@ -93,6 +93,10 @@ class Effect(ABC):
     while_moving: ClassVar[bool] = False
     """Whether it shows only where a reference follows the motion moment by moment."""
 
+    one_vector: ClassVar[bool] = False
+    """Whether its parameters are components of one vector, which no axis is likelier to
+    be along: none of them is zero because the recording does not show it."""
+
     usual: ClassVar[bool] = False
     """Whether every triad has it until it is calibrated: who has one has the others."""
 
@@ -115,6 +119,10 @@ class Effect(ABC):
     def applies(self, x: Experience) -> bool:
         """Whether its covariate is known in some rows."""
         return True
+
+    def acts_on(self, x: Experience) -> bool:
+        """Whether it changes rows like these, where others show that it is there."""
+        return self.applies(x)
 
     def chance(self, x: Experience) -> float:
         """Probability that a session has it, before its rows are seen."""

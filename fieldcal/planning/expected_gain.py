@@ -258,7 +258,8 @@ class ExpectedGain:
         self, positions: Sequence[Position]
     ) -> tuple[Array, Array, Array]:
         """T (n, m, k), h(s) - T u_s (n, m) and R (n, m, m) of windows and turns."""
-        d, values, seen = self.dictionary, self.found.values, self.dictionary.observed
+        d, seen = self.dictionary, self.dictionary.observed
+        values = self.found.fit.pad(self.found.values)
         state = replace(
             self.found.state,
             small_rotation=np.zeros_like(self.found.state.small_rotation),

@@ -184,7 +184,7 @@ def _in_other_dictionary(
     new: dict[str, list[tuple[Group, list[Group]]]] = {}
     for group, cause in wanted.items():
         if has_equation(group):
-            if group.effect is not None and group.effect.applies(d.x):
+            if group.effect is not None and group.effect.acts_on(d.x):
                 new.setdefault(cause.key, []).append((group, _group_variants(d, group)))
         elif cause.key in every:
             same = every[cause.key]
@@ -209,7 +209,8 @@ def _group_variants(d: Dictionary, group: Group) -> list[Group]:
     if not isinstance(effect, Motion | Sensor):
         raise TypeError(f"{group.cause} has no equation")
     whole = next(at for part, at in parameter_groups(d, effect) if part == group.part)
-    if isinstance(effect, Motion) or len(whole) > MAX_SUBSET_PARAMETERS:
+    separate = not (isinstance(effect, Motion) or effect.one_vector)
+    if not separate or len(whole) > MAX_SUBSET_PARAMETERS:
         whole_group = replace(group, params=_in_axes_of(d, group))
         return groups_at_points(d, whole_group, [(group.shape, group.origin)])
     own = (group.shape, group.origin)

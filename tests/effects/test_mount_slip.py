@@ -59,6 +59,33 @@ def test_a_calibration_of_a_device_that_slips_is_right(
         assert (np.abs(off) < 4 * np.array(found["sigma"])).all(), name
 
 
+@pytest.mark.thorough
+def test_a_slip_in_a_position_is_known_to_positions_of_unknown_angles(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the length of the force alone, with turns that begin after the slip.
+
+    The accelerometers do not see it about the vertical, which is no reason for it to
+    be none: it would be a cross-coupling in the position after.
+    """
+    faces = [(85.0, 8.0), (-95.0, -6.0), (175.0, 10.0), (5.0, 80.0), (-8.0, -83.0)]
+    taken = places([(0.0, 0.0), (45.0, 5.0), *faces])
+    slip = {"about_x_deg": -0.1, "about_y_deg": 0.2, "about_z_deg": -0.4}
+    hidden = checked_effect("mount_slip", {**slip, "at_s": taken[0]["start_s"] + 9.0})
+    profile = replace(CALM, effects=(*CALM.effects, hidden))
+    block = recorded(profile, taken, 5)
+    for one in taken[2:]:
+        del one["alpha_deg"], one["beta_deg"]
+    write_session(tmp_path / "s", block, taken)
+    main(["solve", str(tmp_path / "s"), "--json", "--angles", "0.002"])
+    said = json.loads(capsys.readouterr().out)
+    assert said["method"] == "scalar"
+    assert said["carried"]["causes"]["mount_slip"] > 0.9
+    found = said["parameters"]["acc_bias"]
+    off = np.array(found["value"]) - profile.truth.acc_bias
+    assert (np.abs(off) < 4 * np.array(found["sigma"])).all()
+
+
 @pytest.mark.parametrize("name", ["mount_slip", "base_step"])
 def test_a_large_turn_is_a_whole_rotation(name: str) -> None:
     """To the square of the angle, which the design leaves out."""

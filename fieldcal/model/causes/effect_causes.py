@@ -200,7 +200,7 @@ def _parameter_subsets(
 
     `at` are the indices of the parameters of one part.
     """
-    if isinstance(effect, Motion) or not at:
+    if isinstance(effect, Motion) or effect.one_vector or not at:
         return [at] if at else []
     reach = np.abs(effect.design(table.x, _any_shape(effect))).max(axis=0)[:, at]
     of_output = [tuple(np.array(at)[reach[c] > 0].tolist()) for c in range(6)]

@@ -478,3 +478,12 @@ def test_what_rounding_has_in_common_is_in_all_windows_and_in_no_turn() -> None:
         assert bool(there.size and there.all()) == (part.channel == 3)
     timed = {one.name: one.timed for _, one in d.bases if isinstance(one, Course)}
     assert not timed["rounding"]
+
+
+@pytest.mark.parametrize("name", ["mount_slip", "base_step"])
+def test_a_vector_has_all_its_components(name: str) -> None:
+    """Nature has no axis about which a slip or a knock is likelier to be none."""
+    every = [v for c in WHOLE.causes if c.name == name for v in c.variants]
+    components = len(catalogue()[name].params)
+    assert every
+    assert {len(v.params) for v in every} == {components}

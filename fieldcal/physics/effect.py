@@ -94,8 +94,9 @@ class Effect(ABC):
     """Whether it shows only where a reference follows the motion moment by moment."""
 
     one_vector: ClassVar[bool] = False
-    """Whether its parameters are components of one vector, which no axis is likelier to
-    be along: none of them is zero because the recording does not show it."""
+    """Whether its parameters are components of one vector: it is along one axis, or
+    along none in particular. A component that is not seen is no reason for it to be
+    zero beside two others."""
 
     usual: ClassVar[bool] = False
     """Whether every triad has it until it is calibrated: who has one has the others."""

@@ -209,18 +209,18 @@ def _group_variants(d: Dictionary, group: Group) -> list[Group]:
     if not isinstance(effect, Motion | Sensor):
         raise TypeError(f"{group.cause} has no equation")
     whole = next(at for part, at in parameter_groups(d, effect) if part == group.part)
-    separate = not (isinstance(effect, Motion) or effect.one_vector)
-    if not separate or len(whole) > MAX_SUBSET_PARAMETERS:
+    if isinstance(effect, Motion) or len(whole) > MAX_SUBSET_PARAMETERS:
         whole_group = replace(group, params=_in_axes_of(d, group))
         return groups_at_points(d, whole_group, [(group.shape, group.origin)])
     own = (group.shape, group.origin)
     grid = [own, *(point for point in shape_points(d, effect) if point != own)]
+    counts = {1, len(whole)} if effect.one_vector else {*range(1, len(whole) + 1)}
     out = [
         whole_group
         if len(params) == len(whole)
         else _with_parameters(whole_group, params)
         for whole_group in groups_at_points(d, replace(group, params=whole), grid)
-        for n in range(1, len(whole) + 1)
+        for n in sorted(counts)
         for params in combinations(whole, n)
     ]
     return sorted(out, key=lambda g: (g.params, g.shape) != (group.params, group.shape))

@@ -198,10 +198,13 @@ def _parameter_subsets(
 ) -> list[tuple[int, ...]]:
     """Subsets of parameters that form variants: all, or those of one or two outputs.
 
-    `at` are the indices of the parameters of one part.
+    A vector has one component or all. `at` are the indices of the parameters of one
+    part.
     """
-    if isinstance(effect, Motion) or effect.one_vector or not at:
+    if isinstance(effect, Motion) or not at:
         return [at] if at else []
+    if effect.one_vector:
+        return [at, *((j,) for j in at)]
     reach = np.abs(effect.design(table.x, _any_shape(effect))).max(axis=0)[:, at]
     of_output = [tuple(np.array(at)[reach[c] > 0].tolist()) for c in range(6)]
     of_output = [subset for subset in of_output if subset and subset != at]

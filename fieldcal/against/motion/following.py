@@ -187,18 +187,23 @@ def _without_idle_lags(
     Linearised about a filter, its absence looks worse than it is, since its effect is
     proportional to the square or cube of its time constant. `members` are settled.
     """
-    most: float | None = None
-    for member in [m for m in members if lag_of(m) != Lag()]:
-        if most is None:
-            most = fit.evidence(members)
-        others = tuple(m for m in members if m[0].key != member[0].key)
-        if most - fit.evidence(others) > LAG_ORDER**2 * ALTERNATIVE_MARGIN:
-            continue
-        lean = fit.copy()
+    lags = [m for m in members if lag_of(m) != Lag()]
+    if not lags:
+        return fit, members
+    most = fit.evidence(members)
+    loss = [most - fit.evidence(_without(members, m)) for m in lags]
+    if max(loss) > LAG_ORDER**2 * ALTERNATIVE_MARGIN:
+        lags.pop(loss.index(max(loss)))  # without it the others would have to grow
+    for member in lags:
+        lean, others = fit.copy(), _without(members, member)
         lean.settle(others)
         if (left := lean.evidence(others)) >= most:
             fit, members, most = lean, others, left
     return fit, members
+
+
+def _without(members: tuple[Member, ...], one: Member) -> tuple[Member, ...]:
+    return tuple(m for m in members if m[0].key != one[0].key)
 
 
 def _motion_rows(block: Block, reference: Reference, start: Alignment) -> MotionRows:

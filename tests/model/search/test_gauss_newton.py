@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult
+from fieldcal.model.search.offer import OfferTable
 from fieldcal.model.search.offered_pairs import offered_pairs
 from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import Search
@@ -264,6 +266,28 @@ def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
     assert found.score >= max(s.score for s in every) - 0.5
     assert found.score >= max(scores) - 1.0
     assert search._with_two_more(empty, np.inf) is empty, "none comes near"
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_only_pairs_that_cannot_reach_a_score_are_left_out(seed: int) -> None:
+    """Whatever the score of the set itself is, and whatever its sign."""
+    search, empty = drawn(seed)
+    whole = max(search.offers.tables(empty), key=lambda table: len(table.offers))
+    assert len(whole.offers) > 3
+    for level in (whole.score, 40.0, -40.0):
+        table = replace(whole, score=level)
+
+        def scores(least: float, table: OfferTable = table) -> dict[Any, float]:
+            pairs = offered_pairs(search.sets, empty, table, least)
+            return {(p.keys, p.first.member, p.second.member): p.score for p in pairs}
+
+        every = scores(-np.inf)
+        least = float(np.median([*every.values()]))
+        kept = scores(least)
+        assert {k for k, s in every.items() if s >= least} <= set(kept)
+        assert all(every[k] == pytest.approx(s) for k, s in kept.items())
+        assert len(kept) < len(every)
+        assert not scores(max(every.values()) + 50.0)
 
 
 class Watched(Search):

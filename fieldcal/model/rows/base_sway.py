@@ -114,8 +114,9 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
             excess = [w.excess_variance for w in waves_by_position[p]]
             left.append(sum(excess, np.zeros(6)) / len(excess) ** 2)
         else:
-            size, t = sizes.mean(axis=0), block.t[a:b]
-            left.append(_unseen_sway_variance(size, t, about.gravity))
+            unit = np.concatenate([about.nominal["acc_scale"], scale])
+            seen = _unseen_sway_variance(sizes.mean(axis=0), block.t[a:b])
+            left.append(seen * np.repeat([about.gravity**2, 1.0], 3) * unit**2)
     root = np.sqrt(max(len(waves_by_position) - 1, 1))
     noise = [w.noise * w.length for waves in waves_by_position.values() for w in waves]
     return BaseSway(
@@ -130,14 +131,16 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
     )
 
 
-def _unseen_sway_variance(size: Array, t: Array, gravity: float) -> Array:
-    """Variance (6,) of the means of a window in which no sway was found.
+def _unseen_sway_variance(size: Array, t: Array) -> Array:
+    """Variance (6,) of the means in a window in which no sway was found.
 
-    The mean of a wave over T has the size sqrt(2) / (w T) of the wave.
+    Of the rotation about each axis, rad^2, and of its rate, rad^2/s^2. The mean of a
+    wave over T has the size sqrt(2) / (w T) of the wave. `size` (2,) are the mean
+    squares of both, about any axis.
     """
     length = float(np.ptp(t)) if len(t) > 1 else np.inf
     turned = 2 * size[0] / max(size[1] / size[0], 1e-12) / length**2
-    return np.repeat([gravity**2 * turned, 2 * size[0] / length**2], 3)
+    return np.repeat([turned, 2 * size[0] / length**2], 3)
 
 
 def _on_known_positions(about: Description) -> bool:

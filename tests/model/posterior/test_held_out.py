@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,9 +16,10 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.sets import Sets
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.posterior.held_out import (
     HeldOut,
+    candidate_sets,
     folds,
     held_out_residuals,
     held_out_turn_residuals,
@@ -257,3 +259,24 @@ def test_squares_are_those_of_the_covariance() -> None:
 
 def test_where_nothing_turned_no_turn_is_foretold() -> None:
     assert held_out_turn_residuals(refit(()).fitted, []).shape == (0,)
+
+
+def test_sets_that_are_compared_are_the_best_and_the_likeliest_beside_it() -> None:
+    """Six within twenty of it, each once, and the empty set however unlikely."""
+
+    @dataclass(eq=False)
+    class Scored:
+        score: float
+        members: tuple[None, ...]
+
+    def one(score: float, members: int = 1) -> Set:
+        return cast(Set, Scored(score, (None,) * members))
+
+    best, empty, far = one(10.0), one(-500.0, 0), one(-10.1)
+    near = [one(10.0 - 2.8 * k) for k in (3, 1, 2, 7)]
+    found = candidate_sets(best, [far, empty, *near, best])
+    ranked = [near[1], near[2], near[0], near[3]]
+    assert found == [best, *ranked, empty]
+    many = [one(9.0 - k) for k in range(9)]
+    assert candidate_sets(best, [*many[::-1], empty]) == [best, *many[:6], empty]
+    assert candidate_sets(empty, [empty]) == [empty]

@@ -21,6 +21,7 @@ from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.model.rows import base_sway
 from fieldcal.model.rows.base_sway import find_base_sway
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
@@ -214,6 +215,43 @@ def test_two_stretches_of_a_window_are_as_uncertain_as_their_mean() -> None:
         # means of independent stretches of the same length
         draws = np.array([one.excess_variance for one in parts])
         np.testing.assert_allclose(excess, draws.mean(axis=0) / len(parts), rtol=0.05)
+
+
+def test_what_a_window_is_too_short_to_show_is_what_waves_leave_in_its_mean() -> None:
+    """Of any phase; three quarters of a period are as bad as the average window.
+
+    In the outputs' own units, as the windows that show it.
+    """
+    rng, rate, hz = np.random.default_rng(2), 25.0, 0.1
+    unit = np.array([2.0, 2.0, 2.0, -50.0, -50.0, -50.0])
+    t = np.arange(0.0, 110.0, 1 / rate)
+    turned = np.deg2rad(0.9) * np.sin(2 * np.pi * hz * t)
+    six = rng.normal(size=(len(t), 6)) * NOISE
+    six[:, 1] += G0 * np.cos(turned)
+    six[:, 2] -= G0 * np.sin(turned)
+    six[:, 3] += np.gradient(turned, t)
+    six *= unit
+    held = [(2.0, 32.0), (40.0, 70.0), (78.0, 85.5)]
+    about = description.parse_description(
+        {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
+                      for a, b in held],
+         "nominal": {"acc_scale": unit[:3].tolist(), "gyr_scale": unit[3:].tolist()}}
+    )  # fmt: skip
+    block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
+    found = find_base_sway(block, about)
+    assert found is not None
+    phase = np.linspace(0.0, 2 * np.pi, 360, endpoint=False)
+    inside = np.linspace(0.0, 7.5, 2001)
+    wave = np.sin(2 * np.pi * hz * inside + phase[:, None]).mean(axis=1)
+    angle = np.deg2rad(0.9) * np.sqrt((wave**2).mean())
+    expected = angle * np.repeat([about.gravity, 2 * np.pi * hz], 3) * np.abs(unit)
+    np.testing.assert_allclose(np.sqrt(found.excess_variance[2]), expected, rtol=0.02)
+    assert (found.excess_variance[0] < 0.1 * found.excess_variance[2]).all()
+
+
+def test_a_window_without_samples_leaves_nothing() -> None:
+    one = np.array([7.0])
+    assert not base_sway._unseen_sway_variance(np.array([1e-4, 1e-4]), one).any()
 
 
 @pytest.mark.thorough

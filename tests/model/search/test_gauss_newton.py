@@ -95,6 +95,41 @@ def test_what_a_part_told_is_begun_with_and_what_it_told_wrongly_is_dropped(
     assert group.shape["tau_s"] == pytest.approx(TAU, rel=0.05)
 
 
+def test_a_set_that_is_held_is_not_searched_beside(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its members are of another dictionary; the state is that with them alone."""
+    told, fit = settling(), fit_of(state_of(SETTLING))
+    monkeypatch.setattr(Search, "run", None)
+    found = Inference(fit).hold(told.best.members)
+    ((cause, group),) = found.best.members
+    assert cause.key == "settling:acc" and cause in fit.dictionary.causes
+    (term,) = found.state.terms
+    assert term.effect is EFFECTS["settling"] and term.shape == group.shape
+    assert found.visited_keys == frozenset() and found.fit is fit
+    assert len(found.values) == fit.dictionary.width
+    own = term.values[list(group.params)]
+    np.testing.assert_allclose(own, found.values[group.columns], atol=1e-12)
+    assert found.turn_rows == [] and found.contradicted_turns == ()
+    # on the grid the time constant is not quite what it was refined to
+    assert chi2(found) == pytest.approx(1.0, abs=0.3)
+    nothing = Inference(fit_of(state_of(SETTLING))).hold(())
+    assert nothing.best.members == () and nothing.state.terms == ()
+    assert chi2(nothing) > 10
+
+
+def test_a_better_set_is_gone_on_from_until_one_comes_again() -> None:
+    told = settling()
+    fit = fit_of(state_of(SETTLING))
+    start = Inference(fit).hold(())
+    found = Inference(fit).resume(start.best, start)
+    assert found.best.keys == told.best.keys
+    assert chi2(found) == pytest.approx(1.0, abs=0.2)
+    (_, group), (_, other) = (r.best.members[0] for r in (found, told))
+    assert group.shape["tau_s"] == pytest.approx(other.shape["tau_s"], rel=0.02)
+    assert Sets.key(start.best.members) in found.visited_keys
+
+
 def test_the_state_is_what_the_columns_say() -> None:
     found, d = settling(), settling().fit.dictionary
     values = found.values

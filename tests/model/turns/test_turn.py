@@ -227,6 +227,55 @@ def test_a_filter_is_what_its_columns_foretell(acc: float, gyr: float) -> None:
         assert seen > 25 and rest < 0.02 * seen + 1.4 * np.sqrt(len(turn.way))
 
 
+def test_what_an_arm_puts_on_the_way_is_what_turns_make_of_it() -> None:
+    """w x (w x r) + w' x r, and of the other causes of a state nothing."""
+    one, arm = ride("lever_arm"), np.array([0.02, -0.01, 0.03])
+    fit = one.fit
+    assert one.group.effect is not None
+    causes = {c.name: c for c in fit.dictionary.causes}
+    scale = causes["gyro_scale"].variants[0]
+    assert scale.effect is not None
+    terms = (Term(scale.effect, np.full(3, 2e-3)), Term(one.group.effect, arm))
+    state = replace(fit.nominal, terms=terms)
+    turns = fit.turns_at(state)
+    assert len(turns) == len(PLACES) - 1
+    for name, group in (("lever_arm", one.group), ("gyro_scale", scale)):
+        found = fit.outputs_in_turns(turns, state, [(causes[name], group)])
+        for turn, out in zip(turns, found, strict=True):
+            w, change = turn.x.w, turn.x.w_dot
+            expected = np.zeros((len(w), 6))
+            if name == "lever_arm":
+                around = np.cross(w, np.cross(w, arm)) + np.cross(change, arm)
+                expected[:, :3] = around
+            else:
+                expected[:, 3:] = 2e-3 * w
+            np.testing.assert_allclose(out, expected, atol=1e-9)
+            assert np.abs(expected).max() > 1e-4
+    for out in fit.outputs_in_turns(turns, state, []):
+        np.testing.assert_allclose(out, 0.0, atol=1e-12)
+
+
+def test_turns_are_followed_to_another_state_without_the_way() -> None:
+    one = ride("gyro_scale")
+    fit = one.fit.independent_copy(one.turns)
+    assert fit.turn_rows == one.turns and fit.turns_at(fit.nominal) == []
+    fit.follow_turns(fit.nominal, one.values)
+    assert fit.turn_rows == one.turns, "it has no recording of turns"
+    assert list(fit.outputs_in_turns([], fit.nominal, [])) == []
+    fit = one.fit
+    term = Term(one.group.effect, one.true)  # type: ignore[arg-type]
+    state = replace(fit.nominal, terms=(*fit.nominal.terms, term))
+    fit.follow_turns(state, one.values)
+    largest = 0.0
+    for turn, before in zip(fit.turn_rows, one.turns, strict=True):
+        assert not len(turn.way) and turn.positions == before.positions
+        predicted = turn.design @ one.values[turn.columns]
+        size = np.linalg.norm(turn.closure)
+        assert np.linalg.norm(turn.closure - predicted) < 1e-4 * size + 1e-6
+        largest = max(largest, float(size))
+    assert largest > 1e-3
+
+
 def test_information_of_closures_is_that_of_noise() -> None:
     """Of white noise over the turn, and of nothing that is not there."""
     for turn in ride("gyro_scale").turns:

@@ -132,6 +132,31 @@ def test_in_a_hand_each_window_is_one_row() -> None:
     )
 
 
+UNIT = np.array([4.0, -0.5, 8.0])
+
+
+@pytest.mark.parametrize("kind", ["calm", "quick", "some"])
+def test_the_unit_of_gyroscopes_changes_no_angle(kind: str) -> None:
+    """Errors of their means are in that unit, as the means are."""
+    angles = np.full((5, 3), 5e-3)
+    if kind == "some":
+        angles = np.zeros((12, 3))
+        angles[7] = 3e-3
+    source = recording(angles, band=SLOWLY if kind == "calm" else QUICKLY)
+    nominal = {**source.about.nominal, "gyr_scale": UNIT}
+    block = replace(source.block, gyr=source.block.gyr * UNIT)
+    about = replace(source.about, nominal=nominal)
+    plain = rows_in_a_hand(source)
+    found = rows_in_a_hand(replace(source, block=block, about=about))
+    assert plain.hand_angle.any()
+    np.testing.assert_allclose(found.hand_angle, plain.hand_angle, rtol=1e-5)
+    np.testing.assert_allclose(found.sd[:, :3], plain.sd[:, :3], rtol=1e-5)
+    np.testing.assert_allclose(found.sd[:, 3:], plain.sd[:, 3:] * np.abs(UNIT), 1e-5)
+    np.testing.assert_allclose(found.y[:, 3:], plain.y[:, 3:] * UNIT, rtol=1e-5)
+    wide = plain.window_error[:, 3:] * np.abs(UNIT)
+    np.testing.assert_allclose(found.window_error[:, 3:], wide)
+
+
 def off_and_told(angles: Array, seeds: range) -> tuple[Array, Array]:
     """What mean rates are off by, and what is told of it, (s, 5, 3) each.
 

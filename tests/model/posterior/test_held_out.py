@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -17,6 +18,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.posterior import held_out
 from fieldcal.model.posterior.held_out import (
     HeldOut,
     candidate_sets,
@@ -280,3 +282,14 @@ def test_sets_that_are_compared_are_the_best_and_the_likeliest_beside_it() -> No
     many = [one(9.0 - k) for k in range(9)]
     assert candidate_sets(best, [*many[::-1], empty]) == [best, *many[:6], empty]
     assert candidate_sets(empty, [empty]) == [empty]
+
+
+def test_estimates_of_random_groups_are_told_apart_by_their_place() -> None:
+    """Of permanent groups in their order; columns of two of them add up."""
+    columns = ((0, 1), (4, 2), (3,), (2, 1))
+    groups = [SimpleNamespace(columns=np.array(at), random=k % 2 == 1)
+              for k, at in enumerate(columns)]  # fmt: skip
+    d = cast(Dictionary, SimpleNamespace(width=6, always=groups))
+    state = SimpleNamespace(estimate=np.arange(1.0, 10.0))
+    found = held_out._random_estimate(cast(Set, SimpleNamespace(state=state)), d)
+    np.testing.assert_array_equal(found, [0.0, 7.0, 4.0 + 6.0, 0.0, 3.0, 0.0])

@@ -152,3 +152,11 @@ def test_outputs_that_are_loud_do_not_spoil_a_line_of_others() -> None:
     unit = np.array([1e-3, 1e3, 1e6])
     other = without_lines((line + noise) * unit, 100.0) / unit - noise
     np.testing.assert_allclose(other[:, 2], off[:, 2], atol=1e-8)
+
+
+def test_the_usual_noise_is_that_of_the_quieter_quarter() -> None:
+    """Of four windows the quietest, though the other three are alike."""
+    six = six_of()[: 4 * N]
+    six[N:, :3] += 0.02 * np.random.default_rng(8).standard_normal((3 * N, 3))
+    found = quiet_window_noise(block_of(six), WINDOWS[:4], RATE)
+    np.testing.assert_allclose(found.white, WHITE, rtol=0.15)

@@ -266,6 +266,91 @@ def test_what_begins_at_a_refined_instant_may_be_of_any_kind() -> None:
         assert then == {g.params for g in other.variants}, key
 
 
+def shared_step(
+    seed: int,
+) -> tuple[Refinement, tuple[tuple[Cause, Group], ...], float]:
+    """Both triads jump at one instant; a set has the jumps at two others."""
+    x = ladder(6)
+    d = dictionary(x)
+    rows = np.flatnonzero(x.position == 6)
+    instant = float(x.t[rows[2:4]].mean())
+    later = (x.t > instant)[:, None]
+    y = np.hstack([x.f, x.w]) + later * np.r_[0.0, 0.03, 0.0, 0.0, 0.0, 2e-3]
+    y += SD * np.random.default_rng(seed).standard_normal(y.shape)
+    fit = GaussNewton(WindowSystem(rows_of(x, y), d), nominal())
+    members = []
+    for key, param, off in (("bias_step:acc", 1, -60.0), ("bias_step:gyr", 5, 50.0)):
+        cause = next(c for c in d.causes if c.key == key)
+        near = [g for g in cause.variants if g.params == (param,)]
+        at = np.abs([g.shape["at_s"] - instant - off for g in near])
+        members.append((cause, near[int(np.argmin(at))]))
+    own = tuple(members)
+    state, values, found = fit.settle(nominal(), np.zeros(d.width), own)
+    return Refinement(fit, state, values, found.sizes), own, instant
+
+
+def test_members_that_begin_together_are_moved_together() -> None:
+    """To the likelier of their instants first, and on from there."""
+    refinement, own, instant = shared_step(3)
+    begins = {g.shape["at_s"] for _, g in own}
+    assert len(begins) == 2 and min(abs(t - instant) for t in begins) > 5
+    found = refinement.refine_shape(own, [0, 1])
+    (at,) = {g.shape["at_s"] for _, g in found}
+    assert [c.key for c, _ in found] == [c.key for c, _ in own]
+    assert [g.params for _, g in found] == [(1,), (5,)]
+    scores = refinement._scores(
+        refinement._trial_sets(own, [0, 1], [*sorted(begins), at])[1:]
+    )
+    assert scores[2] >= max(scores)
+    assert scores[2] > max(scores[:2]) or at in begins
+    # of one alone the other stays where it is
+    ((_, moved), (_, kept)) = refinement.refine_shape(own, [0])
+    assert kept is own[1][1] and moved.params == (1,)
+    # a jump has no parabola, and no time constant
+    assert all(np.isnan(g.shape_sigma) for _, g in found)
+
+
+def test_the_largest_step_is_that_of_the_state_in_its_deviations() -> None:
+    """Of bias and scale factor and of effects; not of what the state does not have."""
+    found, d = settling(), settling().fit.dictionary
+    walk = next(c for c in d.causes if c.key == "random_walk:gyr")
+    members = (*found.best.members, (walk, walk.variants[0]))
+    beside = found.search.sets.evaluate(members)
+    state = beside.state
+    sigma = np.sqrt(np.diag(state.inverse))
+    kept = [g for g in [*d.always, *(g for _, g in members)] if g.in_state]
+    inside = np.unique(np.concatenate([g.columns for g in kept]))
+    outside = np.setdiff1d(state.columns, inside)
+    assert len(outside)
+    values = np.zeros(d.width)
+    for column, times in ((d.bias + 2, 3.0), (d.scale + 1, -5.0)):
+        at = int(np.flatnonzero(state.columns == column)[-1])
+        values[column] = times * sigma[at]
+        step = found.fit.largest_step(beside, np.zeros(d.width), values)
+        assert step == pytest.approx(abs(times))
+        back = found.fit.largest_step(beside, values, np.zeros(d.width))
+        assert back == pytest.approx(abs(times))
+    values[outside] = 1e3
+    assert found.fit.largest_step(beside, values * 0, values) == pytest.approx(5.0)
+
+
+def test_a_position_that_lies_elsewhere_is_turned_in_the_state() -> None:
+    """Without angles, by what the set leaves of its force, along its own two axes."""
+    x = ladder(6, (2,))
+    d = dictionary(x)
+    small = np.zeros((len(LADDER), 2))
+    small[2] = 4e-4, -7e-4
+    true = replace(nominal(), small_rotation=small)
+    y = true.output(true.experienced(x), d.since)
+    fit = GaussNewton(WindowSystem(rows_of(x, y), d), nominal())
+    fitted, _ = fit.estimate(nominal(), np.zeros(d.width), ())
+    state, values = fit.state_at_estimate(fitted)
+    np.testing.assert_allclose(state.small_rotation[2], small[2], rtol=0.02)
+    np.testing.assert_array_equal(values[d.rotations].reshape(-1, 2),
+                                  state.small_rotation)  # fmt: skip
+    assert not np.delete(state.small_rotation, 2, axis=0).any()
+
+
 # --- two at a time
 
 KEYS = ("angle_offset", "quadratic", "g_sensitivity", "bias_drift:acc",

@@ -257,3 +257,20 @@ def test_cells_are_means_of_whole_tenths_of_a_second() -> None:
     rare = sway._cells(3 * np.arange(16.0), np.zeros((16, 6)))
     assert rare is not None and len(rare[0]) == 16 and rare[2] == 3.0
     assert sway._cells(3 * np.arange(15.0), np.zeros((15, 6))) is None
+
+
+def test_a_wave_above_a_hundredth_of_the_power_of_rotation_is_kept() -> None:
+    """Of cosines and sines about all axes, as angles and not as rates."""
+    hz, zero = np.array([0.1, 0.4, 0.9]), np.zeros((3, 6))
+    cos, sin = zero.copy(), zero.copy()
+    turned = np.array([[0.02, 0.0, 0.01], [0.0, 1.9e-3, 0.0], [0.0, -2.7e-3, 0.0]])
+    cos[:, 3:] = turned * 2 * np.pi * hz[:, None]
+    sin[:, 3:] = [[0.0, -0.005, 0.0], [0.0, 0.0, -1.0e-3], [0.0, 0.0, 0.0]]
+    sin[:, 3:] *= 2 * np.pi * hz[:, None]
+    waves = SwayWaves(
+        hz, 0.0, cos, sin, REST[:3], np.zeros(3), np.zeros(6), NOISE**2, 0.1,
+        (0.0, 30.0), PLAIN,
+    )  # fmt: skip
+    power = [4e-4 + 1e-4 + 2.5e-5, 1.9e-3**2 + 1e-6, 2.7e-3**2]
+    assert [p > 0.01 * power[0] for p in power] == [True, False, True]
+    np.testing.assert_array_equal(sway._significant(waves).hz, [0.1, 0.9])

@@ -45,7 +45,7 @@ class WindowNoise:
     ----------
     noise : (6,) usual standard deviation of one sample
     levels : (w, 6) standard deviation of one sample that applies to each window's means
-    variance : (w, 3) of the accelerometers' samples in each window, (m/s^2)^2
+    variance : (w, 3) of the accelerometers' samples in each window, squares of outputs
     block : the samples without the vibration lines of single windows
 
     """

@@ -123,7 +123,7 @@ def test_in_a_hand_each_window_is_one_row() -> None:
     for i, start in enumerate(STEADY[:5]):
         some = source.block.between(start, start + SECONDS)
         np.testing.assert_allclose(found.y[i], some.six.mean(axis=0), atol=1e-12)
-        np.testing.assert_allclose(found.x.variance[i], some.acc.var(axis=0))
+        np.testing.assert_allclose(found.x.variance[i], some.acc.var(axis=0) / 4)
     np.testing.assert_allclose(found.sd[:, :3], np.tile(found.noise[:3], (5, 1))
                                / 500**0.5, rtol=1e-9)  # fmt: skip
     assert found.hand_angle.shape == (5, 3)

@@ -12,13 +12,15 @@ from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
 from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes import columns, smooth
+from fieldcal.model.causes import columns, effect_causes, smooth
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.effect_causes import units_of
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.system.window_rows import WindowSystem
+from fieldcal.physics.effect import Sensor
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.experience_rows import select_rows
 
@@ -478,3 +480,31 @@ def test_what_rounding_has_in_common_is_in_all_windows_and_in_no_turn() -> None:
         assert bool(there.size and there.all()) == (part.channel == 3)
     timed = {one.name: one.timed for _, one in d.bases if isinstance(one, Course)}
     assert not timed["rounding"]
+
+
+def test_sizes_of_parameters_are_in_the_unit_of_what_they_change() -> None:
+    """Whatever unit they have themselves: a delay of gyroscopes is in s."""
+    effects = catalogue()
+    acc, gyr = UNIT[0], UNIT[3]
+    for name, expected in {
+        "gyro_scale": [gyr] * 3,
+        "gyro_cross_coupling": [gyr] * 6,
+        "gyro_products": [gyr] * 9,
+        "time_delay": [gyr],
+        "bandwidth": [acc, gyr],
+        "second_order": [acc, gyr],
+        "increments": [acc, gyr],
+        "g_sensitivity": [gyr] * 9,
+        "quadratic": [acc] * 3,
+        "bias_step": [acc] * 3 + [gyr] * 3,
+        "mount_slip": [acc] * 3,
+        "lever_arm": [1.0] * 3,
+        "random_walk": [1.0] * 6,
+    }.items():
+        found = units_of(WHOLE, effects[name])
+        np.testing.assert_array_equal(found, expected, name)
+    for effect in effects.values():
+        if isinstance(effect, Sensor) and effect.params:
+            rows = effect_causes._rows_in_motion()
+            changes = effect.design(rows, effect_causes._any_shape(effect))
+            assert changes.any(axis=(0, 1)).all(), effect.id

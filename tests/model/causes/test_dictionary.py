@@ -140,6 +140,9 @@ def test_of_few_windows_instability_is_within_them() -> None:
     at = one.columns[:k]
     (first_at,) = (n for n, b in d.bases if b.name == "flicker")
     np.testing.assert_array_equal(at, first_at + np.arange(k))
+    # what goes on by the clock does so while the device is turned too
+    timed = {b.name: b.timed for _, b in d.bases if isinstance(b, Course)}
+    assert timed["flicker"] and timed["waves"] and not timed["window"]
     others = first(3, rows=30), first(2, rows=1)
     for y in others:
         few = rows_of(y, np.hstack([y.f, y.w]))

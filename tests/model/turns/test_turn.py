@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -381,6 +382,24 @@ def test_the_time_since_a_turn_counts_from_where_it_ends() -> None:
     )
     np.testing.assert_allclose(since[0], [np.inf, 0.0, 2.0], atol=1e-9)
     assert abs(ended[0] - (2 * SPACING_S)) < 0.7
+
+
+def test_on_the_way_the_clock_of_the_session_goes_on() -> None:
+    fit = ride("gyro_scale").fit
+    assert fit.turns is not None
+    tracker = fit.turns.tracker
+    source = replace(tracker.source)
+    later = replace(source, block=replace(source.block, t=source.block.t + 500.0))
+    tracker = copy(tracker)
+    tracker.source = later
+    for turn in tracker.turns(fit.nominal):
+        np.testing.assert_allclose(
+            turn.x.since_start, turn.t - 500.0 - source.block.t[0]
+        )
+        middle = (turn.t[0] + turn.t[-1]) / 2 - 500.0
+        assert abs((middle - 1.0) % SPACING_S - 9.0) < 1.5, "between two windows"
+        assert np.isinf(turn.x.since_turn).all()
+        assert (turn.x.position == -1).all()
 
 
 def test_a_gyroscope_that_is_off_on_the_way_bends_a_turn_as_its_bias_does() -> None:

@@ -29,6 +29,7 @@ from fieldcal.model.posterior.held_out import (
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
+from fieldcal.physics.experience_rows import select_rows
 
 ROWS = 3 * len(LADDER)
 
@@ -293,3 +294,20 @@ def test_estimates_of_random_groups_are_told_apart_by_their_place() -> None:
     state = SimpleNamespace(estimate=np.arange(1.0, 10.0))
     found = held_out._random_estimate(cast(Set, SimpleNamespace(state=state)), d)
     np.testing.assert_array_equal(found, [0.0, 7.0, 4.0 + 6.0, 0.0, 3.0, 0.0])
+
+
+def test_of_few_windows_each_stretch_is_foretold_from_the_others() -> None:
+    """Stretches of neighbouring rows, as even as they come; of many, whole windows."""
+    x = select_rows(ladder(55), range(110))
+    few = SimpleNamespace(x=x, window_positions=np.array([0, 1]))
+    found = folds(cast(Dictionary, few))
+    parts = held_out.STRETCHES_PER_WINDOW
+    for p in range(2):
+        own = found[x.position == p]
+        assert np.count_nonzero(np.diff(own)) == parts - 1
+        first = [0, *(np.flatnonzero(np.diff(own)) + 1)]
+        assert own[first].tolist() == [i % held_out.MAX_FOLDS for i in range(parts)]
+        lengths = np.diff([*first, len(own)])
+        assert lengths.max() - lengths.min() <= 1
+    whole = folds(dictionary(ladder(3)))
+    np.testing.assert_array_equal(whole, ladder(3).position % held_out.MAX_FOLDS)

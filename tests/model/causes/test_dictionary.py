@@ -511,3 +511,13 @@ def test_sizes_of_parameters_are_in_the_unit_of_what_they_change() -> None:
             rows = effect_causes._rows_in_motion()
             changes = effect.design(rows, effect_causes._any_shape(effect))
             assert changes.any(axis=(0, 1)).all(), effect.id
+
+
+def test_a_cause_whose_size_is_known_has_it_in_all_its_variants() -> None:
+    cause = CAUSES["settling:acc"]
+    found = cause.with_size(0.3)
+    assert cause.with_size(None) is cause and found.key == cause.key
+    assert len(found.variants) == len(cause.variants) > 1
+    for one, before in zip(found.variants, cause.variants, strict=True):
+        assert one.fixed_size == 0.3 and before.fixed_size is None
+        assert one.columns is before.columns and one.shape == before.shape

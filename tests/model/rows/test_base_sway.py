@@ -249,6 +249,37 @@ def test_what_a_window_is_too_short_to_show_is_what_waves_leave_in_its_mean() ->
     assert (found.excess_variance[0] < 0.1 * found.excess_variance[2]).all()
 
 
+@pytest.mark.parametrize("unit", [[2.0, 2.0, 2.0, 8.0, 8.0, 8.0],
+                                  [-1.0, 1.0, 1.0, 1.0, -1.0, -4.0]])  # fmt: skip
+def test_sway_is_the_same_in_any_unit_and_of_axes_that_are_mirrored(
+    unit: list[float],
+) -> None:
+    """Forces and rates make one rotation only in axes of one handedness."""
+    rng, rate = np.random.default_rng(2), 25.0
+    t = np.arange(0.0, 75.0, 1 / rate)
+    turned = np.deg2rad(0.9) * np.sin(2 * np.pi * 0.31 * t)
+    six = rng.normal(size=(len(t), 6)) * NOISE
+    six[:, 1] += G0 * np.cos(turned)
+    six[:, 2] -= G0 * np.sin(turned)
+    six[:, 3] += np.gradient(turned, t)
+    held = [(2.0, 32.0), (40.0, 70.0)]
+    about = description.parse_description(
+        {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
+                      for a, b in held]}
+    )  # fmt: skip
+    block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
+    plain = find_base_sway(block, about)
+    scaled = {"acc_scale": np.array(unit[:3]), "gyr_scale": np.array(unit[3:])}
+    other = replace(about, nominal={**about.nominal, **scaled})
+    found = find_base_sway(block.with_six(block.six * unit), other)
+    assert plain is not None and found is not None
+    assert found.amplitude == pytest.approx(plain.amplitude, rel=1e-6)
+    np.testing.assert_allclose(found.block.six / unit, plain.block.six, atol=1e-9)
+    variance = found.excess_variance / np.square(unit)
+    np.testing.assert_allclose(variance, plain.excess_variance, rtol=1e-6)
+    np.testing.assert_allclose(found.white, plain.white * np.abs(unit), rtol=1e-6)
+
+
 def test_a_window_without_samples_leaves_nothing() -> None:
     one = np.array([7.0])
     assert not base_sway._unseen_sway_variance(np.array([1e-4, 1e-4]), one).any()

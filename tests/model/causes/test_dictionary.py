@@ -521,3 +521,39 @@ def test_a_cause_whose_size_is_known_has_it_in_all_its_variants() -> None:
     for one, before in zip(found.variants, cause.variants, strict=True):
         assert one.fixed_size == 0.3 and before.fixed_size is None
         assert one.columns is before.columns and one.shape == before.shape
+
+
+def test_walks_have_as_many_cosines_as_each_output_wanders_by() -> None:
+    """Of each set of outputs: a cosine k of a walk is a k-th as large."""
+    modes = smooth.MAX_COSINES + np.array([0, 7, 3, 1, 9, 0])
+    d = made(ladder(), wander=replace(Wander.none(), modes=modes))
+    params = catalogue()["random_walk"].params
+    seen = set()
+    for key, some in (("random_walk:acc", (0, 1, 2)), ("random_walk:gyr", (3, 4, 5))):
+        (cause,) = [c for c in d.causes if c.key == key]
+        for group in cause.variants:
+            assert set(group.params) <= {*some}
+            at = [d.cosine_columns(c, modes[c]) for c in group.params]
+            np.testing.assert_array_equal(group.columns, np.concatenate(at))
+            shape = d.span.walk()
+            sizes = [shape[: modes[c]] * params[c].typical * UNIT[c]
+                     for c in group.params]  # fmt: skip
+            np.testing.assert_allclose(group.typical, np.concatenate(sizes))
+            seen.add(group.params)
+    assert {(0, 1, 2), (3, 4, 5)} <= seen
+
+
+def test_where_the_rate_of_the_earth_is_measured_each_position_may_be_aside() -> None:
+    """By two turns of its own, and no others: columns of these positions alone."""
+    x = ladder(free=(1, 4, 6))
+    shown = np.isin(x.position, (1, 4, 6))
+    x = replace(x, w=np.where(shown[:, None], [1e-5, -6e-5, 3e-5], 0.0))
+    d = made(x)
+    (group,) = [g for g in d.always if g.cause == "earth aside"]
+    ((first_at, basis),) = [(n, b) for n, b in d.bases if b.name == "earth aside"]
+    assert (group.columns - first_at).tolist() == [2, 3, 8, 9, 12, 13]
+    assert group.part == "gyr" and group.fixed_size == priors.FREE_SIZE
+    np.testing.assert_allclose(group.prior_sigma(priors.FREE_SIZE), 1.0)
+    table = basis.evaluate(RowView.of(x, d.since, nominal()))
+    np.testing.assert_array_equal(np.flatnonzero(table.any(axis=(0, 1))),
+                                  group.columns - first_at)  # fmt: skip

@@ -12,7 +12,6 @@ from fieldcal.core.samples import Array
 from fieldcal.windows.sway_waves import SwayWaves
 
 FORCE, ARM = np.array([1.0, -9.0, 4.0]), np.array([0.5, 2.0, -1.0])
-SCALE = np.array([1.0, -50.0, 2.0])
 HZ, MIDDLE = np.array([0.13, 0.31]), 107.0
 PULSE = 2 * np.pi * HZ[:, None]
 COS, SIN = np.random.default_rng(4).normal(0.0, 0.02, (2, 2, 3))
@@ -24,11 +23,11 @@ T: Array = MIDDLE + np.linspace(-9.0, 8.0, 40)
 def waves_of(size: float = 1.0) -> SwayWaves:
     """The rotation's waves as gyroscopes show them; accelerometers show others."""
     cos, sin = np.full((2, 6), 7.0), np.full((2, 6), -3.0)
-    cos[:, 3:] = size * PULSE * SIN * SCALE
-    sin[:, 3:] = -size * PULSE * COS * SCALE
+    cos[:, 3:] = size * PULSE * SIN
+    sin[:, 3:] = -size * PULSE * COS
     zero = np.zeros(6)
     return SwayWaves(HZ, MIDDLE, cos, sin, FORCE, ARM, zero, zero, 0.1,
-                     (MIDDLE - 9.0, MIDDLE + 8.0), SCALE)  # fmt: skip
+                     (MIDDLE - 9.0, MIDDLE + 8.0))  # fmt: skip
 
 
 def angle(t: Array, size: float = 1.0) -> Array:
@@ -56,7 +55,7 @@ def exact(size: float) -> Array:
     pushed = (places[0] - 2 * places[1] + places[2]) / step**2
     force = now.inv().apply(FORCE + pushed) - FORCE
     rate = (early.inv() * late).as_rotvec() / (2 * step)
-    return np.hstack([force, rate * SCALE])
+    return np.hstack([force, rate])
 
 
 def test_squares_are_what_a_rotation_and_its_reverse_have_in_common() -> None:
@@ -89,7 +88,7 @@ def test_one_wave_has_its_own_mean_frequency_and_periods() -> None:
     """Of five seconds at 0.3 Hz one and a half; its mean squares over whole periods."""
     size = np.deg2rad(2.0)
     cos = np.zeros((1, 6))
-    cos[0, 4] = size * 2 * np.pi * 0.3 * SCALE[1]
+    cos[0, 4] = size * 2 * np.pi * 0.3
     one = replace(waves_of(), hz=np.array([0.3]), cos=cos, sin=0 * cos,
                   span=(MIDDLE, MIDDLE + 5.0))  # fmt: skip
     turned, rate = one.mean_squares

@@ -95,7 +95,7 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
     waves_by_position = {
         p: waves
         for p, (a, b) in enumerate(windows)
-        if b > a and (waves := find_sway(felt.t[a:b], felt[a:b].six, np.ones(3)))
+        if b > a and (waves := find_sway(felt.t[a:b], felt[a:b].six))
     }
     if len(waves_by_position) < MIN_SWAYING_SHARE * len(windows):
         return None

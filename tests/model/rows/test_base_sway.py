@@ -149,7 +149,7 @@ def test_a_part_of_a_slow_wave_is_no_drift() -> None:
     for held in (pier.held()[2], pier.held()[4]):
         some = (block.t >= held.start) & (block.t < held.end)
         t, six = block.t[some], block.six[some]
-        (found,) = find_sway(t, six, np.ones(3))
+        (found,) = find_sway(t, six)
         s = (t - t.mean()) / np.ptp(t) * 2
         left = six - found.outputs(t) - firm.six[some]
         assert np.abs(left[:, :3].T @ s / (s @ s)).max() < 1e-3
@@ -160,7 +160,7 @@ def test_beating_waves_have_no_arm() -> None:
     waves = "sway:amplitude_deg=1,hz=0.1008,spread_hz=0.01008,phase_deg=97.12,"
     block = played(100, f"{waves}azimuth_deg=7.375")
     some = (block.t >= positions()[4]["start_s"]) & (block.t < positions()[4]["end_s"])
-    (found,) = find_sway(block.t[some], block.six[some], np.ones(3))
+    (found,) = find_sway(block.t[some], block.six[some])
     assert np.abs(found.arm).max() < 3.0
 
 
@@ -210,7 +210,7 @@ def test_two_stretches_of_a_window_are_as_uncertain_as_their_mean() -> None:
     assert found is not None
     for (start, end), excess in zip(held, found.excess_variance, strict=True):
         some = (t >= start) & (t < end)
-        parts = find_sway(t[some], six[some], np.ones(3))
+        parts = find_sway(t[some], six[some])
         assert len(parts) == 1 + (end - start > 40)
         # means of independent stretches of the same length
         draws = np.array([one.excess_variance for one in parts])

@@ -11,9 +11,10 @@ from scipy.stats import multivariate_normal
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import joined_rests, same_attitude
-from fieldcal.windows.cells import CellTable
+from fieldcal.windows.cells import CellAccumulator, CellTable
 from fieldcal.windows.quiet import estimate_quiet_noise
 from fieldcal.windows.same_attitude import probability_unmoved
+from fieldcal.windows.stretches import cell_rows
 
 FORCE = np.array([2.0, -5.0, 8.0])
 SPREAD = np.array([1e-3, 2e-3, 3e-3]) ** 2
@@ -270,3 +271,36 @@ def test_samples_beside_a_jump_agree_with_either_side_within_their_steps() -> No
         six[11, :3] += push
         way = Block.of(2.0 + 0.02 * np.arange(30), six[:, :3], six[:, 3:])
         assert joined_rests._is_untouched(before, way, after) == untouched
+
+
+def test_the_way_from_rest_to_rest_is_all_of_it_and_a_cell_on_either_side(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And of both rests as many cells as tell their noise, none of them cut."""
+    monkeypatch.setattr(joined_rests, "NOISE_CELLS", 500)
+    t = 0.02 * np.arange(6000)
+    block = Block.of(t, FORCE + np.zeros((6000, 3)), np.zeros((6000, 3)))
+    sums = CellAccumulator()
+    sums.add(block)
+    rows, origin = cell_rows(sums.table), sums.table.origin
+    asked: list[tuple[Array, ...]] = []
+
+    def unmoved(
+        before: CellTable, way: Block, after: CellTable, gap: tuple[float, float]
+    ) -> float:
+        asked.append((before.times, way.t, after.times, np.array(gap)))
+        return 1.0
+
+    def between(start: float, end: float) -> list[Block]:
+        return [block.between(start, end)]
+
+    monkeypatch.setattr(joined_rests, "probability_unmoved", unmoved)
+    monkeypatch.setattr(joined_rests, "_is_untouched", lambda *_: False)
+    gaps = joined_rests._gaps_to_leave_out(
+        rows, origin, between, (3.0, 50.005), (51.505, 117.0)
+    )
+    ((early, way, later, gap),) = asked
+    assert gaps == [(50.005, 51.505)] and gap.tolist() == [50.005, 51.505]
+    assert way[0] == pytest.approx(49.92) and way[-1] == pytest.approx(51.6)
+    assert len(early) == 470 and early[-1] == pytest.approx(49.9, abs=0.03)
+    assert len(later) == 500 and later[0] == pytest.approx(51.6, abs=0.03)

@@ -104,7 +104,7 @@ def recorded(*errors: SimulatedEffect) -> tuple[Block, list[HeldWindow]]:
 
 
 def followed(
-    block: Block, windows: list[HeldWindow]
+    block: Block, windows: list[HeldWindow], unit: Array | None = None
 ) -> tuple[GaussNewton, Set, list[TurnRows]]:
     """The fit of a ride, what windows say, and rows of turns about nominal."""
     places = [
@@ -115,6 +115,10 @@ def followed(
         "format": 1, "device": {"name": "turned"}, "position": places,
         "site": {"latitude_deg": 50.45, "height_m": 170.0},
     })  # fmt: skip
+    if unit is not None:
+        scaled = {"acc_scale": unit[:3], "gyr_scale": unit[3:]}
+        about = replace(about, nominal={**about.nominal, **scaled})
+        block = block.with_six(block.six * unit)
     prepared = prepare_recording(block, about)
     fit = build_fit(prepared.source, prepared.rows, prepared)
     d, at_rest = fit.dictionary, np.zeros(fit.dictionary.width)
@@ -275,6 +279,27 @@ def test_turns_are_followed_to_another_state_without_the_way() -> None:
         assert np.linalg.norm(turn.closure - predicted) < 1e-4 * size + 1e-6
         largest = max(largest, float(size))
     assert largest > 1e-3
+
+
+def test_the_unit_of_outputs_changes_neither_turns_nor_evidence() -> None:
+    """Not even where gyroscopes have another one than accelerometers."""
+    unit = np.repeat([2.0, 8.0], 3)
+    ridden = recorded(checked_effect("gyro_scale", ERRORS["gyro_scale"]))
+    (fit, known, turns), (other, again, found) = (
+        followed(*ridden, scale) for scale in (None, unit)
+    )
+    assert again.score == pytest.approx(known.score, rel=1e-9)
+    for turn, before in zip(found, turns, strict=True):
+        np.testing.assert_allclose(turn.info, before.info, rtol=1e-6)
+        np.testing.assert_allclose(turn.closure, before.closure, atol=1e-9)
+        np.testing.assert_allclose(turn.way, before.way, atol=1e-3)
+    keys = {c.key for c in fit.dictionary.causes}
+    assert {c.key for c in other.dictionary.causes} == keys
+    causes = {c.key: c for c in other.dictionary.causes}
+    for cause in fit.dictionary.causes:
+        if cause.name.startswith("gyro_"):
+            group, scaled = cause.variants[0], causes[cause.key].variants[0]
+            np.testing.assert_allclose(scaled.typical, 8.0 * group.typical)
 
 
 def test_information_of_closures_is_that_of_noise() -> None:

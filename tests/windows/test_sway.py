@@ -273,3 +273,14 @@ def test_a_wave_above_a_hundredth_of_the_power_of_rotation_is_kept() -> None:
     power = [4e-4 + 1e-4 + 2.5e-5, 1.9e-3**2 + 1e-6, 2.7e-3**2]
     assert [p > 0.01 * power[0] for p in power] == [True, False, True]
     np.testing.assert_array_equal(sway._significant(waves).hz, [0.1, 0.9])
+
+
+def test_of_large_swaying_nothing_is_left_but_noise() -> None:
+    """Squares at twice the frequency are subtracted once: no wave has them as well."""
+    t, six = swayed(
+        np.random.default_rng(3), (0.2,), degrees=6.0, arm=np.array([0.0, 3.0, 0.0])
+    )
+    (found,) = find_sway(t, six)
+    left = six - found.outputs(t)
+    np.testing.assert_allclose(left.std(axis=0), NOISE, rtol=0.1)
+    assert (np.abs(left.mean(axis=0) - REST) < NOISE / 10).all()

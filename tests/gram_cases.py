@@ -50,14 +50,19 @@ class Case:
 
 
 def case(
-    seed: int, free: tuple[int, ...] = (), tau: Array = TAU, turns: bool = True
+    seed: int,
+    free: tuple[int, ...] = (),
+    tau: Array = TAU,
+    turns: bool = True,
+    known: KnownRows | None = None,
 ) -> Case:
     """Random rows of windows and turns; a window lacks a channel, another one a row."""
     rng = np.random.default_rng(seed)
     width = WIDTH + 2 * WINDOWS
     held = np.arange(WINDOWS)
     common = rng.uniform(0.0, 0.5, (WINDOWS, 6))
-    columns = Columns(width, held, common, np.isin(held, free), SMALL_ROTATION)
+    columns = Columns(width, held, common, np.isin(held, free), SMALL_ROTATION,
+                      known)  # fmt: skip
     values = np.where(rng.random(width) < 0.3, rng.standard_normal(width), 0.0)
     linear, parts = [], []
     for c in range(6):

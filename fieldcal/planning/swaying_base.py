@@ -30,6 +30,5 @@ def window_seconds_needed(hz: float, grade: GradeNoise) -> float:
         SwayWaves(
             np.array([hz]), 0.0, amplitude[None], np.zeros((1, 6)),
             np.array([0.0, -G0, 0.0]), none[:3], none, white, CELL, (0.0, whole),
-            np.ones(3),
         )
     )  # fmt: skip

@@ -40,7 +40,7 @@ def stretch_end_reasons(
     """
     out = []
     for start, end in spans:
-        first, last = cell_index(rows, start), cell_index(rows, end - 1e-9)
+        first, last = cell_index(rows, start), cell_index(rows, end)
         inside = CellTable(rows[first : last + 1][:, 0], rows[first : last + 1][:, 1:],
                            origin)  # fmt: skip
         k = round(BEYOND / CELL)

@@ -56,7 +56,7 @@ ROUNDS = 4
 """Fits of the arm, each with the noise left by the one before."""
 
 
-def find_sway(t: Array, six: Array, scale: Array) -> list[SwayWaves]:
+def find_sway(t: Array, six: Array) -> list[SwayWaves]:
     """Look for swaying in a window.
 
     Parameters
@@ -64,7 +64,6 @@ def find_sway(t: Array, six: Array, scale: Array) -> list[SwayWaves]:
     t : (n,) s
     six : (n, 6) m/s^2 and rad/s, nan where missing; without gyroscopes the
         accelerometers tell it alone (`sway_by_force`)
-    scale : (3,) nominal scale factors of the gyroscopes
 
     Returns
     -------
@@ -80,14 +79,14 @@ def find_sway(t: Array, six: Array, scale: Array) -> list[SwayWaves]:
     if parts > len(t):  # samples minutes apart, or times in another unit
         return []
     waves = [
-        _waves_of_stretch(t[some], six[some], scale)
+        _waves_of_stretch(t[some], six[some])
         for some in np.array_split(np.arange(len(t)), parts)
     ]
     out = [wave for wave in waves if wave is not None]
     return out if len(out) == parts else []
 
 
-def _waves_of_stretch(t: Array, six: Array, scale: Array) -> SwayWaves | None:
+def _waves_of_stretch(t: Array, six: Array) -> SwayWaves | None:
     """Waves of one stretch; None if there are none, or if they are no rotation."""
     cells = _cells(t, six)
     if cells is None:
@@ -98,14 +97,12 @@ def _waves_of_stretch(t: Array, six: Array, scale: Array) -> SwayWaves | None:
     hz = hz[hz >= max(LOWEST, 1 / span)]
     force, ends = y[:, :3].mean(axis=0), (float(t[0]), float(t[-1]))
     alone = y.shape[1] == 3
-    if not _oscillates(
-        lean_angles(y, force) if alone else _turn_angle(y, scale, length)
-    ):
+    if not _oscillates(lean_angles(y, force) if alone else _turn_angle(y, length)):
         return None
     none = np.zeros(y.shape[1])
     plain = SwayWaves(
         hz[:0], float(at.mean()), y[:0], y[:0], force, none[:3], none, none, length,
-        ends, scale,
+        ends,
     )  # fmt: skip
     hz = wave_frequencies(at, y, hz, 1 / (8 * span))
     whole = with_turn_rates if alone else _fit_arm
@@ -134,9 +131,9 @@ def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
     return own.mean(axis=1)[whole], y[whole], each * step
 
 
-def _turn_angle(y: Array, scale: Array, length: float) -> Array:
+def _turn_angle(y: Array, length: float) -> Array:
     """Integral of the gyroscopes of cells (m, 6) less their mean, (m, 3) rad."""
-    rate = y[:, 3:] / scale
+    rate = y[:, 3:]
     angle: Array = np.cumsum((rate - rate.mean(axis=0)) * length, axis=0)
     return angle
 

@@ -35,7 +35,7 @@ def with_turn_rates(waves: SwayWaves) -> SwayWaves:
     The rates follow from (1): phi = c cos wt + s sin wt has the derivative
     w s cos wt - w c sin wt.
     """
-    force, pulse = waves.force, 2 * np.pi * waves.hz[:, None] * waves.scale
+    force, pulse = waves.force, 2 * np.pi * waves.hz[:, None]
     cos, sin = (
         -np.cross(force, part) / float(force @ force) for part in (waves.cos, waves.sin)
     )

@@ -51,7 +51,7 @@ def fit_waves(t: Array, y: Array, hz: Array, known: SwayWaves) -> SwayWaves | No
     ----------
     t : (m,) s, middles of the cells
     hz : (k,) frequencies
-    known : force, scale factors and times of the stretch; its waves are replaced
+    known : force and times of the stretch; its waves are replaced
 
     """
     return _WaveProcess(t, y, hz, known).waves()
@@ -69,7 +69,7 @@ class _WaveProcess:
     ----------
     t, y : (m,), (m, c) cells
     hz : (k,) frequencies
-    known : force, scale factors and times of the stretch
+    known : force and times of the stretch
 
     """
 
@@ -82,7 +82,7 @@ class _WaveProcess:
         self.table = np.column_stack([np.cos(wave) * mean, np.sin(wave) * mean, line])
         self.free = self.table - self.table.mean(axis=0)
         self.off = y - y.mean(axis=0)
-        rate = np.multiply.outer(2 * np.pi * hz, np.abs(known.scale))
+        rate = np.tile(2 * np.pi * hz[:, None], 3)
         size = np.full((len(hz), 3), np.linalg.norm(known.force))
         self.drift = np.array(DRIFT)[: y.shape[1]]
         self.size = np.tile(np.hstack([size, rate])[:, : y.shape[1]], (2, 1))

@@ -24,13 +24,12 @@ class SwayWaves:
     ----------
     hz : (k,) frequencies
     middle : s, origin of the phases
-    cos, sin : (k, 6) amplitudes of the outputs
+    cos, sin : (k, 6) amplitudes of the outputs, m/s^2 and rad/s
     force, arm : (3,) m/s^2 and m, force at rest and arm from the centre of rotation
     excess_variance : (6,) variance of the means at rest beyond that of white noise
     noise : (6,) variance of a mean over a cell of `length` s; nan without gyroscopes
     length : length of a cell, s
     span : first and last instant of the stretch, s
-    scale : (3,) outputs of the gyroscopes per rad/s
 
     """
 
@@ -44,7 +43,6 @@ class SwayWaves:
     noise: Array
     length: float
     span: tuple[float, float]
-    scale: Array
 
     @property
     def mean_squares(self) -> tuple[float, float]:
@@ -69,7 +67,7 @@ class SwayWaves:
     def turn_angle(self, t: Array, order: int = 0) -> Array:
         """Rotation phi at instants t (n,), or its derivative, (n, 3) rad / s^order."""
         pulse = 2 * np.pi * self.hz[:, None]
-        size = pulse ** (order - 1) / self.scale
+        size = pulse ** (order - 1)
         wave = self._angle(t) + np.pi / 2 * (order - 1)
         out: Array = np.cos(wave) @ (size * self.cos[:, 3:])
         out += np.sin(wave) @ (size * self.sin[:, 3:])
@@ -91,7 +89,7 @@ class SwayWaves:
         out = np.empty((len(t), 6))
         out[:, :3] = np.cross(phi, np.cross(phi, self.force)) / 2
         out[:, :3] += np.cross(rate, np.cross(rate, self.arm))  # (1)
-        out[:, 3:] = -np.cross(phi, rate) / 2 * self.scale  # (2)
+        out[:, 3:] = -np.cross(phi, rate) / 2  # (2)
         return out
 
     def _angle(self, t: Array) -> Array:

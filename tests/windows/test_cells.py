@@ -252,3 +252,21 @@ def test_cells_last_as_long_as_the_samples_in_them(rate: float, jitter: float) -
     cells.add(Block.of(t, rng.standard_normal((len(t), 3))))
     assert cells.table.seconds == pytest.approx(40.0, rel=0.02)
     assert cells.table.period == pytest.approx(max(0.1, 1 / rate), rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("at", "left"),
+    [(52.05, 20), (52.0, 20), (51.99, 19), (50.05, 0), (53.0, 30), (60.0, 30)],
+)
+def test_cells_that_end_after_an_instant_are_cut_off(at: float, left: int) -> None:
+    """As if the samples behind had not come; those that follow begin cells anew."""
+    t = 50.0 + 0.01 * np.arange(300)
+    six = np.random.default_rng(2).normal(size=(300, 6))
+    samples = Block.of(t, six[:, :3], six[:, 3:])
+    found = filled(samples)
+    found.truncate(at)
+    assert len(found.table) == left and found.n == 10 * left
+    last = 50.0 + 0.1 * left - 0.01
+    assert found.end == pytest.approx(last if left else 50.0)
+    if left:
+        assert_same(found.table, filled(samples[: 10 * left]).table)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import ACC, GYR, Block
+from fieldcal.windows import dead_axis
 from fieldcal.windows.dead_axis import (
     LiveAxisRows,
     broken_axis_messages,
@@ -114,3 +115,13 @@ def test_where_nothing_changes_everything_is_looked_at() -> None:
     assert (
         alive.samples_without_dead_axes(lambda start, end: nothing)(0.0, 1.0) is nothing
     )
+
+
+def test_the_share_of_changes_is_that_of_neighbours_that_were_measured() -> None:
+    """A lost value parts nothing; one value never changed, and none is not known."""
+    nan = np.nan
+    for values, share in (
+        ([1.0, 1.0, 2.0, nan, 2.0, 1.0], 2 / 4), ([3.0], 0.0), ([nan, 3.0], 0.0),
+    ):  # fmt: skip
+        assert dead_axis._share_of_changes(np.array(values)) == pytest.approx(share)
+    assert np.isnan(dead_axis._share_of_changes(np.array([nan])))

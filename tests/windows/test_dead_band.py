@@ -88,3 +88,19 @@ def test_the_operator_reads_which_outputs_hide_what() -> None:
     means[1, 4] = -0.03
     (line,) = dead_band_messages(block, means)
     assert line.startswith("gy is zero where less than 0.02 rad/s is measured")
+
+
+@pytest.mark.parametrize(("zeros", "lost", "found"),
+                         [(2, 0, True), (1, 3, False), (2, 3, True)])  # fmt: skip
+def test_two_zeros_that_were_received_show_a_band(
+    zeros: int, lost: int, found: bool
+) -> None:
+    """Of gyroscopes where any channel arrived, of accelerometers where gravity did."""
+    values = np.tile([1.0, 1.3, 1.5, -1.4, 3.0, -8.0], 4)[:, None] * BAND
+    acc, gyr = values * np.ones(3), 0.7 * values * np.ones(3)
+    acc[:zeros, 1] = gyr[5 : 5 + zeros, 2] = 0.0
+    acc[10 : 10 + lost] = gyr[10 : 10 + lost] = 0.0
+    expected = np.zeros(6)
+    if found:
+        expected[[1, 5]] = BAND, 0.7 * BAND
+    np.testing.assert_allclose(of_triads(acc, gyr), expected)

@@ -309,3 +309,21 @@ def test_white_noise_under_a_walk_is_the_rest_of_a_square(
     grown = np.array([1.0, 4.0, 16.0, 64.0] if walks else [1.0, 2.0, 4.0, 8.0])
     found = noise._white_under_walk(lengths, 4 + 9 * grown, np.full(4, 0.02))
     assert found == (sees and pytest.approx(sees))
+
+
+def test_of_many_squares_exactly_the_largest_tenth_is_left_out() -> None:
+    x = white(np.random.default_rng(12), 6001, 1)
+    expected, _ = slow([x[:, 0]], 1)
+    assert noise._level([x], 1)[0][0] == pytest.approx(expected, rel=1e-10)
+
+
+def test_a_walk_shows_between_the_two_longest_means() -> None:
+    """Where these agree within three standard errors, a rise beyond is none."""
+    lengths, spreads = (8, 4, 2, 1), np.full(4, 0.02)
+    for slope, walks in ((0.0070, False), (0.0085, True)):
+        levels = 4 + slope * np.square(lengths, dtype=float)
+        apart = abs(levels[0] - levels[1]) / (np.hypot(0.02, 0.02) * levels[0])
+        assert (apart > 3) == walks
+        assert abs(levels[0] - levels[2]) > 3 * np.hypot(0.02, 0.02) * levels[0]
+        found = noise._white_under_walk(lengths, levels, spreads)
+        assert found == (pytest.approx(2.0) if walks else None)

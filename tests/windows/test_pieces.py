@@ -164,3 +164,55 @@ def test_outputs_that_are_missing_do_not_keep_pieces_apart() -> None:
     before, same, other = (cast(Window, mean) for mean in pieces)  # alike in both
     assert PiecedWindow._agree(before, same)
     assert not PiecedWindow._agree(before, other)
+
+
+def test_what_is_kept_is_tested_again_from_its_beginning() -> None:
+    """A push at 20 s, of which nobody knew when another one ended it at 30 s."""
+    rng = np.random.default_rng(2)
+    pieces, block = PiecedWindow(None, Grain()), rest(rng, 0.0, 32.0, np.zeros(6))
+    block.acc[2000:2080, 2] += 0.4 * np.sin(np.linspace(0, np.pi, 80))
+    pieces.add(block)
+    kept = pieces.keep_undisturbed(Moved("", 30.0, "az", 0.1))
+    assert 18.0 < kept < 20.0
+    pieces.add(rest(rng, 40.0, 12.0, np.zeros(6)))
+    assert pieces.average() is not None
+    ((end, start),) = pieces.gaps
+    assert end < 20.0 and start == pytest.approx(40.0)
+
+
+def test_noise_is_learned_from_each_piece_and_a_stated_step_counts_in_all() -> None:
+    rng, grain = np.random.default_rng(2), Grain(0.3, 0.02)
+    block = rest(rng, 0.0, 12.0, np.zeros(6))
+    for piece, step in ((block, Grain()), (rest(rng, 30.0, 12.0, np.zeros(6)), grain)):
+        pieces = PiecedWindow(None, step)
+        pieces.add(block)
+        window = Window(None, None, step)
+        window.add(block)
+        window.truncate(10.0)
+        learned = window.noise
+        pieces.keep_undisturbed(Moved("", 11.0, "ax", 1.0))
+        begun = pieces._now._before  # the next piece begins with it
+        assert begun is not None and learned is not None
+        assert learned.shape_likelihood.any()
+        np.testing.assert_array_equal(begun.shape_likelihood, learned.shape_likelihood)
+        pieces.add(piece if piece is not block else rest(rng, 30.0, 12.0, np.zeros(6)))
+        found = pieces.average()
+        assert found is not None
+        white = NOISE / np.sqrt(found.n)
+        ratio = (found.sigma / white).min()
+        # values within a step of 15 and 10 times the noise say little of where it is
+        assert ratio > 10 if step is grain else ratio < 2
+
+
+def test_all_pieces_together_are_good_enough_if_they_are_at_rest() -> None:
+    """By the error of both; by a test of both as one window."""
+    pieces = in_gusts(3)
+    sigma = float(np.nanmax(pieces.sigma[:3]))
+    assert pieces.reason_to_stop(None) is None
+    assert pieces.reason_to_stop(0.9 * sigma) is None
+    whole = pieces.average()
+    assert whole is not None
+    one = PiecedWindow(None, Grain())
+    one.add(rest(np.random.default_rng(3), 0.0, 30.0, np.zeros(6)))
+    assert one.reason_to_stop(1.1 * float(np.nanmax(one.sigma[:3]))) is not None
+    assert pieces.reason_to_stop(1.1 * sigma) is not None

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows import same_attitude
-from fieldcal.windows.cells import CellTable
+from fieldcal.windows import joined_rests, same_attitude
+from fieldcal.windows.cells import CellAccumulator, CellTable
 from fieldcal.windows.quiet import estimate_quiet_noise
 from fieldcal.windows.same_attitude import probability_unmoved
+from fieldcal.windows.stretches import cell_rows
 
 FORCE = np.array([2.0, -5.0, 8.0])
 SPREAD = np.array([1e-3, 2e-3, 3e-3]) ** 2
@@ -225,3 +228,79 @@ def test_the_largest_angle_of_the_force_is_that_of_a_tenth_of_a_second() -> None
     rare = Block.of(np.arange(4.0), up + np.diag([0.1, 0.2, 0.3, 0.4])[:, :3])
     assert same_attitude._largest_angle(rare, up) == pytest.approx(0.03)
     assert np.isnan(same_attitude._largest_angle(block[50:], up))
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 40])
+def test_a_turn_in_a_gap_is_as_uncertain_as_its_samples_and_both_sides(
+    count: int,
+) -> None:
+    """(4) sample by sample, of as high differences as there are."""
+    rng, dt = np.random.default_rng(count), 0.02
+    t, level = 7.0 + dt * np.arange(count), np.array([0.1, -0.2, 0.3])
+    gyr = level + rng.normal(0.0, 0.01, (count, 3)) + [0.5, 0.0, -0.2]
+    change, spread = np.array([3e-3, 1e-3, 2e-3]), np.array([4e-6, 1e-6, 9e-6])
+    way = Block.of(t, np.zeros((count, 3)), gyr)
+    angle, variance, most = same_attitude._turn_in_gap(way, level, change, spread)
+    off = gyr - level
+    sums = np.vstack([np.zeros(3), np.cumsum((off[1:] + off[:-1]) / 2 * dt, axis=0)])
+    np.testing.assert_allclose(angle, sums[-1], atol=1e-4)
+    assert most == pytest.approx(np.linalg.norm(sums, axis=1).max(), abs=1e-4)
+    k = min(4, count - 1)
+    weights = [(-1) ** j * comb(k, j) for j in range(k + 1)]
+    fast = [
+        np.dot(weights, off[i : i + k + 1]) ** 2 / sum(w**2 for w in weights)
+        for i in range(count - k)
+    ]
+    expected = count * dt**2 * np.mean(fast, axis=0) + (most**2 / 2) ** 2
+    expected += (t[-1] - t[0]) ** 2 * (spread / 4 + change**2 / 12)
+    np.testing.assert_allclose(variance, expected)
+
+
+def test_samples_beside_a_jump_agree_with_either_side_within_their_steps() -> None:
+    """Coarse ones too: a step is their noise. A sample amid is from a touch."""
+    rng = np.random.default_rng(3)
+    for step, push, untouched in (
+        (1e-6, 0.0, True), (1e-6, 0.05, False), (0.02, 0.05, True), (0.02, 0.4, False),
+    ):  # fmt: skip
+        means = 1e-4 * rng.standard_normal((20, 6))
+        before = cells(means, np.zeros(6), 0.1 * np.arange(20), step)
+        after = cells(means + 0.01, np.zeros(6), 3 + 0.1 * np.arange(20), step)
+        six = np.zeros((30, 6))
+        six[17:] = 0.01
+        six += 1e-4 * rng.standard_normal(six.shape)
+        six[11, :3] += push
+        way = Block.of(2.0 + 0.02 * np.arange(30), six[:, :3], six[:, 3:])
+        assert joined_rests._is_untouched(before, way, after) == untouched
+
+
+def test_the_way_from_rest_to_rest_is_all_of_it_and_a_cell_on_either_side(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And of both rests as many cells as tell their noise, none of them cut."""
+    monkeypatch.setattr(joined_rests, "NOISE_CELLS", 500)
+    t = 0.02 * np.arange(6000)
+    block = Block.of(t, FORCE + np.zeros((6000, 3)), np.zeros((6000, 3)))
+    sums = CellAccumulator()
+    sums.add(block)
+    rows, origin = cell_rows(sums.table), sums.table.origin
+    asked: list[tuple[Array, ...]] = []
+
+    def unmoved(
+        before: CellTable, way: Block, after: CellTable, gap: tuple[float, float]
+    ) -> float:
+        asked.append((before.times, way.t, after.times, np.array(gap)))
+        return 1.0
+
+    def between(start: float, end: float) -> list[Block]:
+        return [block.between(start, end)]
+
+    monkeypatch.setattr(joined_rests, "probability_unmoved", unmoved)
+    monkeypatch.setattr(joined_rests, "_is_untouched", lambda *_: False)
+    gaps = joined_rests._gaps_to_leave_out(
+        rows, origin, between, (3.0, 50.005), (51.505, 117.0)
+    )
+    ((early, way, later, gap),) = asked
+    assert gaps == [(50.005, 51.505)] and gap.tolist() == [50.005, 51.505]
+    assert way[0] == pytest.approx(49.92) and way[-1] == pytest.approx(51.6)
+    assert len(early) == 470 and early[-1] == pytest.approx(49.9, abs=0.03)
+    assert len(later) == 500 and later[0] == pytest.approx(51.6, abs=0.03)

@@ -236,3 +236,19 @@ def test_a_device_without_noise_is_not_judged_but_by_what_moves() -> None:
     stillness.add(Block.of(t, acc))
     assert (stillness.meter, stillness.still) == (0.0, True)
     assert stillness.since == pytest.approx(0.0)
+
+
+def test_a_base_that_sways_is_still_as_long_as_each_output_scatters_little() -> None:
+    """By the deviation of the last eight means, whatever their level is."""
+    rng = np.random.default_rng(7)
+    t = np.arange(200) / 100
+    for channel, size, limit in ((1, 0.45, 0.5), (4, 0.12, 0.1)):
+        six = np.array([0.3, -9.8, 0.2, 0.02, -0.01, 0.0]) + np.zeros((200, 6))
+        six[:, channel] += size * np.sin(2 * np.pi * 1.3 * t) * np.sqrt(2)
+        six += 1e-4 * rng.standard_normal(six.shape)
+        told = Stillness(sways=True)
+        told.add(Block.of(t, six[:, :3], six[:, 3:])[:-1])
+        means = six[:190].reshape(19, 10, 6).mean(axis=1)[-8:]
+        expected = (means.std(axis=0) / np.repeat([0.5, 0.1], 3)).max()
+        assert told.meter == pytest.approx(expected, rel=1e-6)
+        assert told.still == (size < limit)

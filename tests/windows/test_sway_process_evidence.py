@@ -11,7 +11,7 @@ from fieldcal.core.samples import Array
 from fieldcal.windows.sway_process import fit_waves, needed_seconds
 from fieldcal.windows.sway_waves import SwayWaves
 
-FORCE, SCALE = np.array([1.0, -9.0, 4.0]), np.array([1.0, -50.0, 2.0])
+FORCE = np.array([1.0, -9.0, 4.0])
 DRIFT = np.array([2e-4, 2e-4, 2e-4, 2e-5, 2e-5, 2e-5])
 LENGTH, MIDDLE = 0.4, 107.0
 
@@ -20,7 +20,7 @@ def waves_of(hz: Array, cos: Array, sin: Array, noise: Array) -> SwayWaves:
     zero = np.zeros(len(noise))
     return SwayWaves(
         hz, MIDDLE, cos, sin, FORCE, np.zeros(3), zero, noise, LENGTH,
-        (MIDDLE - 12.0, MIDDLE + 12.0), SCALE,
+        (MIDDLE - 12.0, MIDDLE + 12.0),
     )  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def test_waves_and_noise_are_those_of_greatest_evidence(channels: int) -> None:
     rng, hz = np.random.default_rng(channels), np.array([0.13, 0.37])
     t = MIDDLE + LENGTH * (np.arange(45) - 22)
     table = columns(t, hz)
-    rate = 2 * np.pi * hz[:, None] * np.abs(SCALE)
+    rate = np.tile(2 * np.pi * hz[:, None], 3)
     size = np.hstack([np.full((2, 3), np.linalg.norm(FORCE)), rate])[:, :channels]
     sigma = np.repeat([5e-3, 2e-3], 3)[:channels] * np.array([1, 3, 1] * 2)[:channels]
     true = np.tile(size, (2, 1)) * [[8e-4], [2e-3], [5e-4], [1e-3]]

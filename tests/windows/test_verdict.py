@@ -359,3 +359,18 @@ def test_lines_go_through_means_with_the_step_of_a_mean(
     (found,) = seen
     assert found is not None
     np.testing.assert_allclose(found, np.repeat([0.005, 0.0], 3), atol=1e-12)
+
+
+def test_values_that_seldom_change_spread_by_how_many_do() -> None:
+    """One in ten or in five, by one step or by many: counted pair by pair."""
+    rng, every = np.random.default_rng(5), np.array([0.1, 0.2, 0.05, 0.1, 0.3, 0.02])
+    there = rng.random((4000, 6)) < every / 2
+    six = 0.25 * there
+    cells = table(Block.of(np.arange(4000) / 100, six[:, :3], six[:, 3:]))
+    found = verdict_module._least_spreads(cells, np.full(6, 7.0))
+    changed = (np.diff(six, axis=0) != 0).mean(axis=0)
+    np.testing.assert_allclose(changed, every * (1 - every / 2), rtol=0.25)
+    p = (2 - np.sqrt(4 - 6 * changed)) / 3
+    np.testing.assert_allclose(found.sampled, 0.25 * np.sqrt(p), rtol=0.02)
+    np.testing.assert_array_equal(found.number, 10.0)
+    np.testing.assert_array_equal(found.always, 7.0)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import combinations
 
 import numpy as np
 
 from fieldcal.core.factory import WARM_UP_TIME_CONSTANT, WARMING_EFFECTS, FactoryErrors
-from fieldcal.core.samples import CHANNELS, Array, Index
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
 from fieldcal.model.causes.column_table import ColumnTable
@@ -28,6 +30,7 @@ from fieldcal.physics.effect import (
     Separable,
 )
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.joint_turns import JointTurns
 
 NO_POINT: Point = (NO_SHAPE, 0)
 """The only grid point of an effect without shape parameters."""
@@ -214,12 +217,31 @@ def _parameter_subsets(
 
 
 def units_of(table: ColumnTable, effect: Effect) -> Array:
-    """Outputs per SI unit for each parameter, (k,); 1 for motion effects."""
-    if isinstance(effect, Motion):
+    """Outputs per SI unit for each parameter, (k,); 1 for motion effects.
+
+    The outputs are those that the parameter changes; accelerometers, if it changes both
+    triads.
+    """
+    if not isinstance(effect, Sensor):
         return np.ones(len(effect.params))
-    gyro = [p.unit.startswith(("rad", "(rad")) for p in effect.params]
+    reach = np.abs(effect.design(_rows_in_motion(), _any_shape(effect))).max(axis=0)
+    gyro = (reach[GYR].max(axis=0) > 0) & (reach[ACC].max(axis=0) == 0)
     out: Array = np.abs(np.where(gyro, table.unit[3], table.unit[0]))
     return out
+
+
+@cache
+def _rows_in_motion() -> Experience:
+    """Two rows in which every sensor effect changes some output."""
+    six, two = np.linspace(1.0, 2.0, 12).reshape(2, 6), np.array([1.0, 2.0])
+    held = Experience.at_rest(
+        0.1 * two, 0.2 * two, G0, w_dot=six[::-1, ACC],
+        slope=six, bend=six, missed=six, f_bend=six[:, ACC], variance=six[:, ACC],
+        warming=two, heating=two, t=two, since_start=two, since_turn=two,
+        position=np.arange(2),
+        joint_turns=JointTurns.of(two - 0.5, np.outer(two, [0.1, 0.2, 0.3])),
+    )  # fmt: skip
+    return replace(held, w=six[:, GYR])
 
 
 def shape_points(table: ColumnTable, effect: Effect) -> Iterator[Point]:

@@ -89,11 +89,13 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
     gyroscopes = np.isfinite(block.gyr).any(axis=0)
     if not _on_known_positions(about) or gyroscopes.any() != gyroscopes.all():
         return None
-    scale, windows = about.nominal["gyr_scale"], window_bounds(block, about)
+    windows = window_bounds(block, about)
+    unit = np.concatenate([about.nominal[n] for n in ("acc_scale", "gyr_scale")])
+    felt = block.with_six(block.six / unit)  # SI, and every axis to its own side
     waves_by_position = {
         p: waves
         for p, (a, b) in enumerate(windows)
-        if b > a and (waves := find_sway(block.t[a:b], block[a:b].six, scale))
+        if b > a and (waves := find_sway(felt.t[a:b], felt[a:b].six))
     }
     if len(waves_by_position) < MIN_SWAYING_SHARE * len(windows):
         return None
@@ -114,14 +116,15 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
             excess = [w.excess_variance for w in waves_by_position[p]]
             left.append(sum(excess, np.zeros(6)) / len(excess) ** 2)
         else:
-            size, t = sizes.mean(axis=0), block.t[a:b]
-            left.append(_unseen_sway_variance(size, t, about.gravity))
+            seen = _unseen_sway_variance(sizes.mean(axis=0), block.t[a:b])
+            left.append(seen * np.repeat([about.gravity**2, 1.0], 3))
     root = np.sqrt(max(len(waves_by_position) - 1, 1))
     noise = [w.noise * w.length for waves in waves_by_position.values() for w in waves]
+    steady = _without_sway(felt, windows, waves_by_position)
     return BaseSway(
-        _without_sway(block, windows, waves_by_position, scale),
-        np.array(left),
-        np.sqrt(np.mean(noise, axis=0) * sampling_rate(block)),
+        block.with_six(steady * unit),
+        np.array(left) * unit**2,
+        np.sqrt(np.mean(noise, axis=0) * sampling_rate(block)) * np.abs(unit),
         float(np.sqrt((amplitude**2).mean())),
         float(hz.mean()),
         (float(amplitude.std() / root), float(hz.std() / root)),
@@ -130,14 +133,16 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
     )
 
 
-def _unseen_sway_variance(size: Array, t: Array, gravity: float) -> Array:
-    """Variance (6,) of the means of a window in which no sway was found.
+def _unseen_sway_variance(size: Array, t: Array) -> Array:
+    """Variance (6,) of the means in a window in which no sway was found.
 
-    The mean of a wave over T has the size sqrt(2) / (w T) of the wave.
+    Of the rotation about each axis, rad^2, and of its rate, rad^2/s^2. The mean of a
+    wave over T has the size sqrt(2) / (w T) of the wave. `size` (2,) are the mean
+    squares of both, about any axis.
     """
     length = float(np.ptp(t)) if len(t) > 1 else np.inf
     turned = 2 * size[0] / max(size[1] / size[0], 1e-12) / length**2
-    return np.repeat([gravity**2 * turned, 2 * size[0] / length**2], 3)
+    return np.repeat([turned, 2 * size[0] / length**2], 3)
 
 
 def _on_known_positions(about: Description) -> bool:
@@ -151,9 +156,8 @@ def _without_sway(
     block: Block,
     windows: NDArray[np.intp],
     waves_by_position: dict[int, list[SwayWaves]],
-    scale: Array,
-) -> Block:
-    """Samples corrected to a base at rest."""
+) -> Array:
+    """Samples (n, 6), SI, corrected to a base at rest."""
     six, rate = block.six, sampling_rate(block)
     for p, of_window in waves_by_position.items():
         a, b = (int(i) for i in windows[p])
@@ -168,7 +172,7 @@ def _without_sway(
             continue
         if p in waves_by_position:
             turned = waves_by_position[p][-1].turn_angle(block.t[end : end + 1])[0]
-            six[end + few : end + 2 * few, 3:] += turned * scale * rate / few
+            six[end + few : end + 2 * few, 3:] += turned * rate / few
         if q in waves_by_position:
             waves, last = (
                 waves_by_position[q][0],
@@ -177,5 +181,5 @@ def _without_sway(
             # the rate falls to rest from this sample to the next one
             turned = waves.turn_angle(block.t[last : last + 2].mean(keepdims=True))[0]
             six[last + 1 : start, 3:] -= waves.outputs(block.t[last + 1 : start])[:, 3:]
-            six[start - 2 * few : start - few, 3:] -= turned * scale * rate / few
-    return block.with_six(six)
+            six[start - 2 * few : start - few, 3:] -= turned * rate / few
+    return six

@@ -104,12 +104,14 @@ def _add_hand_motion(source: RowSource, rows: Rows, angle: float) -> Rows:
     `angle` is the least rms angle by which it turns the force, rad.
     """
     block = masked(source.block, source.usable)
-    unit = np.abs(source.about.nominal["acc_scale"])
+    nominal = source.about.nominal
+    unit, rate_unit = (np.abs(nominal[name]) for name in ("acc_scale", "gyr_scale"))
     turned, pushed, turns = np.zeros((len(rows.x), 3)), np.zeros(len(rows.x)), []
     bound = window_bounds(source.block, source.about)[rows.x.position]
     for i, (a, b) in enumerate(bound):
         white, lasts = rows.sd[i], float(rows.length[i])
-        turned[i] = _tremor_rms(block.gyr[a:b], lasts, white[3:])
+        rates = block.gyr[a:b] / rate_unit
+        turned[i] = _tremor_rms(rates, lasts, white[3:] / rate_unit)
         up = rows.x.f[i] / (np.linalg.norm(rows.x.f[i]) or np.nan)  # gyroscopes alone
         force = block.acc[a:b] / unit
         spread = np.array([np.linalg.norm(white[:3] / unit * up)])
@@ -122,7 +124,7 @@ def _add_hand_motion(source: RowSource, rows: Rows, angle: float) -> Rows:
     trembles = square.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     k = drift_factor(turns, trembles / rows.length**2)
     slow = np.sqrt(STEADY_HAND_K * angle**2 + k * turned**2) / length  # (1)
-    sd[:, 3:] = np.hypot(sd[:, 3:], slow)
+    sd[:, 3:] = np.hypot(sd[:, 3:], slow * rate_unit)
     fast = np.sqrt(STEADY_HAND_K) * pushed[:, None] / length * unit  # (1)
     sd[:, :3] = np.hypot(sd[:, :3], fast)
     # difference between the angle at the end of a rest and the mean angle

@@ -291,7 +291,7 @@ def average_rows(
     position : (n,) index of each row's position
     level : (n, 6) standard deviation of one sample in each row
     noise : (6,) usual standard deviation of one sample
-    variance : (n, 3) of the samples of the accelerometers, (m/s^2)^2
+    variance : (n, 3) of the samples of the accelerometers, squares of the outputs
 
     """
     block = source.block
@@ -344,7 +344,7 @@ def _experience(
         since_turn=t - source.rest_began[position],
         warming=warming,
         heating=heating,
-        variance=np.nan_to_num(variance),
+        variance=np.nan_to_num(variance) / about.nominal["acc_scale"] ** 2,
         position=position,
         rate=gyroscopes.rates(about.mounting),
         base_force=about.base_force,

@@ -45,7 +45,7 @@ class WindowNoise:
     ----------
     noise : (6,) usual standard deviation of one sample
     levels : (w, 6) standard deviation of one sample that applies to each window's means
-    variance : (w, 3) of the accelerometers' samples in each window, (m/s^2)^2
+    variance : (w, 3) of the accelerometers' samples in each window, squares of outputs
     block : the samples without the vibration lines of single windows
 
     """
@@ -174,7 +174,10 @@ def _strongest_line_hz(y: Array, rate_hz: float) -> float | None:
 
 
 def _fit_line(t: Array, y: Array, known: NDArray[np.bool_], hz: float) -> Array:
-    """The line near a frequency, (n, c), its frequency fitted to all outputs."""
+    """The line near a frequency, (n, c), its frequency fitted to all outputs.
+
+    Each counts by its own noise, which is what the fit leaves of it.
+    """
     for _ in range(FREQUENCY_STEPS):
         design = _waves(t, hz)
         amplitude = np.linalg.lstsq(design[known], y[known], rcond=None)[0]
@@ -182,6 +185,8 @@ def _fit_line(t: Array, y: Array, known: NDArray[np.bool_], hz: float) -> Array:
         rise = np.column_stack([-design[:, 2], design[:, 1]]) @ amplitude[1:]
         slope = (2 * np.pi * t[:, None] * rise)[known]
         slope -= design[known] @ np.linalg.lstsq(design[known], slope, rcond=None)[0]
+        noise = np.sqrt(np.maximum((left**2).mean(axis=0), 1e-300))
+        slope, left = slope / noise, left / noise
         step = float((slope * left).sum() / max(float((slope**2).sum()), 1e-300))
         hz += float(np.clip(step, -1 / t[-1], 1 / t[-1]))
     design = _waves(t, hz)

@@ -21,6 +21,10 @@ located, and the whole gap between the windows is integrated."""
 BELONGING_S = 5.0
 """Time before and after a motion in which smaller motions are looked for, s."""
 
+MIN_MOTION_RATE, MOTION_SIGMAS = 3e-3, 8.0
+"""Limit of motion in a tenth of a second: rad/s, and standard deviations of its mean
+by noise, whichever is more."""
+
 MOVING_SIGMAS = 5.0
 """Standard deviations of the integrated angle from which the device moves."""
 
@@ -49,16 +53,18 @@ def motion_bounds(
     rates = [rows.y[rows.x.position == p, 3:] for p in pair]
     if not all(np.isfinite(window_rates).any(axis=0).all() for window_rates in rates):
         return whole  # the rates at rest are not known
-    rest = [np.nanmean(window_rates, axis=0) for window_rates in rates]
-    total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])
+    unit = np.abs(source.about.nominal["gyr_scale"])
+    gyr, noise = block.gyr[gap] / unit, rows.noise[3:] / unit
+    rest = [np.nanmean(window_rates, axis=0) / unit for window_rates in rates]
+    total = np.vstack([np.zeros(3), np.cumsum(gyr - rest[1], axis=0)])
     mean_rate = np.abs(total[m:] - total[:-m]) / m
-    limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
+    limit = np.maximum(MOTION_SIGMAS * noise / np.sqrt(m), MIN_MOTION_RATE)
     at = np.flatnonzero((mean_rate > limit).any(axis=1))
-    if not (len(at) and mean_rate.max() > MIN_MOTION_RATIO * limit.min()):
+    if not (len(at) and (mean_rate / limit).max() > MIN_MOTION_RATIO):
         return whole
-    noise, nearby = rows.noise[3:], round(BELONGING_S * rate)
-    before = block.gyr[gap][max(at[0] - nearby, 0) : at[0]] - rest[0]
-    after = block.gyr[gap][at[-1] + m : at[-1] + m + nearby] - rest[1]
+    nearby = round(BELONGING_S * rate)
+    before = gyr[max(at[0] - nearby, 0) : at[0]] - rest[0]
+    after = gyr[at[-1] + m : at[-1] + m + nearby] - rest[1]
     margin = round(MARGIN_S * rate)
     start = first + int(at[0]) - _moving_at_end(before, noise) - margin
     end = first + int(at[-1]) + m + _moving_at_end(after[::-1], noise) + margin

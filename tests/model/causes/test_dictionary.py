@@ -12,13 +12,15 @@ from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
 from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes import columns, smooth
+from fieldcal.model.causes import columns, effect_causes, smooth
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.effect_causes import units_of
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.system.window_rows import WindowSystem
+from fieldcal.physics.effect import Sensor
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.experience_rows import select_rows
 
@@ -138,6 +140,9 @@ def test_of_few_windows_instability_is_within_them() -> None:
     at = one.columns[:k]
     (first_at,) = (n for n, b in d.bases if b.name == "flicker")
     np.testing.assert_array_equal(at, first_at + np.arange(k))
+    # what goes on by the clock does so while the device is turned too
+    timed = {b.name: b.timed for _, b in d.bases if isinstance(b, Course)}
+    assert timed["flicker"] and timed["waves"] and not timed["window"]
     others = first(3, rows=30), first(2, rows=1)
     for y in others:
         few = rows_of(y, np.hstack([y.f, y.w]))
@@ -486,3 +491,77 @@ def test_a_vector_is_along_one_axis_or_has_all_its_components(name: str) -> None
     every = {v.params for c in WHOLE.causes if c.name == name for v in c.variants}
     components = tuple(range(len(catalogue()[name].params)))
     assert every == {components, *((j,) for j in components)}
+
+
+def test_sizes_of_parameters_are_in_the_unit_of_what_they_change() -> None:
+    """Whatever unit they have themselves: a delay of gyroscopes is in s."""
+    effects = catalogue()
+    acc, gyr = UNIT[0], UNIT[3]
+    for name, expected in {
+        "gyro_scale": [gyr] * 3,
+        "gyro_cross_coupling": [gyr] * 6,
+        "gyro_products": [gyr] * 9,
+        "time_delay": [gyr],
+        "bandwidth": [acc, gyr],
+        "second_order": [acc, gyr],
+        "increments": [acc, gyr],
+        "g_sensitivity": [gyr] * 9,
+        "quadratic": [acc] * 3,
+        "bias_step": [acc] * 3 + [gyr] * 3,
+        "mount_slip": [acc] * 3,
+        "lever_arm": [1.0] * 3,
+        "random_walk": [1.0] * 6,
+    }.items():
+        found = units_of(WHOLE, effects[name])
+        np.testing.assert_array_equal(found, expected, name)
+    for effect in effects.values():
+        if isinstance(effect, Sensor) and effect.params:
+            rows = effect_causes._rows_in_motion()
+            changes = effect.design(rows, effect_causes._any_shape(effect))
+            assert changes.any(axis=(0, 1)).all(), effect.id
+
+
+def test_a_cause_whose_size_is_known_has_it_in_all_its_variants() -> None:
+    cause = CAUSES["settling:acc"]
+    found = cause.with_size(0.3)
+    assert cause.with_size(None) is cause and found.key == cause.key
+    assert len(found.variants) == len(cause.variants) > 1
+    for one, before in zip(found.variants, cause.variants, strict=True):
+        assert one.fixed_size == 0.3 and before.fixed_size is None
+        assert one.columns is before.columns and one.shape == before.shape
+
+
+def test_walks_have_as_many_cosines_as_each_output_wanders_by() -> None:
+    """Of each set of outputs: a cosine k of a walk is a k-th as large."""
+    modes = smooth.MAX_COSINES + np.array([0, 7, 3, 1, 9, 0])
+    d = made(ladder(), wander=replace(Wander.none(), modes=modes))
+    params = catalogue()["random_walk"].params
+    seen = set()
+    for key, some in (("random_walk:acc", (0, 1, 2)), ("random_walk:gyr", (3, 4, 5))):
+        (cause,) = [c for c in d.causes if c.key == key]
+        for group in cause.variants:
+            assert set(group.params) <= {*some}
+            at = [d.cosine_columns(c, modes[c]) for c in group.params]
+            np.testing.assert_array_equal(group.columns, np.concatenate(at))
+            shape = d.span.walk()
+            sizes = [shape[: modes[c]] * params[c].typical * UNIT[c]
+                     for c in group.params]  # fmt: skip
+            np.testing.assert_allclose(group.typical, np.concatenate(sizes))
+            seen.add(group.params)
+    assert {(0, 1, 2), (3, 4, 5)} <= seen
+
+
+def test_where_the_rate_of_the_earth_is_measured_each_position_may_be_aside() -> None:
+    """By two turns of its own, and no others: columns of these positions alone."""
+    x = ladder(free=(1, 4, 6))
+    shown = np.isin(x.position, (1, 4, 6))
+    x = replace(x, w=np.where(shown[:, None], [1e-5, -6e-5, 3e-5], 0.0))
+    d = made(x)
+    (group,) = [g for g in d.always if g.cause == "earth aside"]
+    ((first_at, basis),) = [(n, b) for n, b in d.bases if b.name == "earth aside"]
+    assert (group.columns - first_at).tolist() == [2, 3, 8, 9, 12, 13]
+    assert group.part == "gyr" and group.fixed_size == priors.FREE_SIZE
+    np.testing.assert_allclose(group.prior_sigma(priors.FREE_SIZE), 1.0)
+    table = basis.evaluate(RowView.of(x, d.since, nominal()))
+    np.testing.assert_array_equal(np.flatnonzero(table.any(axis=(0, 1))),
+                                  group.columns - first_at)  # fmt: skip

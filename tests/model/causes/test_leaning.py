@@ -37,6 +37,7 @@ def test_a_lean_turns_force_and_gyroscopes_as_a_rotation_does() -> None:
     table.wander = replace(Wander.none(), leans=np.array([0, 0, 0, 0, 3, 0, 0, 0, 0]))
     group = leaning(table)
     assert group is not None and len(group.columns) == 2 * 3
+    assert group.random and not group.in_state
     np.testing.assert_allclose(group.typical * [1, 2, 3, 1, 2, 3], group.typical[0])
     _, basis = table.bases[-1]
     assert isinstance(basis, General)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from observed import BIAS, COUPLING, SCALE, G, outputs
 
+from fieldcal.core.frames import direction_cosines
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import (
@@ -13,7 +14,10 @@ from fieldcal.model.causes.planned import (
     design_matrix,
     parameters,
     predict_outputs,
+    rows_at_session_end,
 )
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.joint_turns import JointTurns
 
 PLACES = tuple(
     Position.deg(a, b) for a, b in [(-40, -30), (0, 0), (5, 0), (30, -20), (170, 35)]
@@ -88,3 +92,35 @@ def test_every_device_has_bias_and_scale_factor() -> None:
     assert parameters("angle_offset")[6:] == (
         "angle_offset.alpha0_deg", "angle_offset.beta0_deg",
     )  # fmt: skip
+
+
+def test_further_positions_are_as_warm_and_as_late_as_the_session_ends() -> None:
+    """Of all that rows have by themselves, the last; the site is the same."""
+    rng = np.random.default_rng(4)
+    per_row = {n: rng.uniform(1.0, 9.0, 4) for n in
+               ("t", "since_start", "since_turn", "warming", "heating")}  # fmt: skip
+    earth = np.array([0.0, 5e-5, 4e-5])
+    force = np.array([0.3, -9.7, 0.2])
+    joints = JointTurns.of(np.arange(4.0), rng.normal(size=(4, 3)))
+    x = Experience.at_rest(
+        rng.normal(size=4), rng.normal(size=4), G, variance=rng.uniform(size=(4, 3)),
+        base_force=force, base_rate=earth, mounting=MOUNTINGS[1], latitude=0.7,
+        gravity_sigma=3e-4, transport=np.array([1e-5, 2e-5, 3e-5]),
+        joint_turns=joints, **per_row,
+    )  # fmt: skip
+    alpha, beta = np.array([0.4, -0.9, np.nan]), np.array([0.2, 0.7, 0.1])
+    found = rows_at_session_end(x, alpha, beta)
+    np.testing.assert_array_equal(found.alpha, alpha)
+    np.testing.assert_array_equal(found.beta, beta)
+    np.testing.assert_array_equal(found.position, [-1, -1, -1])
+    for name, values in per_row.items():
+        np.testing.assert_array_equal(getattr(found, name), values[[3, 3, 3]])
+    np.testing.assert_array_equal(found.variance, x.variance[[3, 3, 3]])
+    for k in range(2):
+        held = direction_cosines(alpha[k : k + 1], beta[k : k + 1])[0]
+        np.testing.assert_allclose(found.f[k], MOUNTINGS[1].T @ held @ force)
+        np.testing.assert_allclose(found.w[k], MOUNTINGS[1].T @ held @ earth)
+    assert found.latitude == 0.7 and found.gravity_sigma == 3e-4
+    assert found.gravity == pytest.approx(np.linalg.norm(force))
+    np.testing.assert_array_equal(found.transport, x.transport)
+    assert found.joint_turns is joints

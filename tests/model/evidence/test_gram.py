@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 from gram_cases import TAU, WIDTH, case
+from scipy.linalg import block_diag
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import CLOSURE
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
 from fieldcal.model.priors import SIZES
+from fieldcal.model.system.linear_system import gram
 
 FREE = pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
 SEEDS = pytest.mark.parametrize("seed", range(4))
@@ -171,3 +178,54 @@ def test_some_columns_say_the_same_as_they_do_among_all(free: tuple[int, ...]) -
     assert found.score == pytest.approx(same.score, rel=1e-12)
     np.testing.assert_allclose(found.estimate, same.estimate, rtol=1e-12)
     np.testing.assert_array_equal(np.flatnonzero(part.index >= 0), SET)
+
+
+@SEEDS
+def test_what_is_known_before_is_as_rows_beside_those_of_the_recording(
+    seed: int,
+) -> None:
+    """Values of sums of columns, with a covariance; also where some are left out."""
+    rng = np.random.default_rng(seed + 100)
+    plain = case(seed)
+    width = plain.dense.design.shape[1]
+    known, rows = [], []
+    for count in (2, 3):
+        design = np.zeros((count, width))
+        design[:, rng.permutation(WIDTH)[:4]] = rng.standard_normal((count, 4))
+        root = rng.standard_normal((count, count))
+        cov = root @ root.T + np.eye(count)
+        residual = rng.standard_normal(count)
+        known.append(KnownRows.of(design, residual, cov))
+        rows.append((residual, design, cov))
+    assert {len(one.columns) for one in known} == {4}
+    both = KnownRows.concatenated(known)
+    one, dense = case(seed, known=both), plain.dense
+    more = block_diag(dense.cov, *(cov for *_, cov in rows))
+    y = np.concatenate([dense.y, *(residual for residual, *_ in rows)])
+    whole = np.vstack([dense.design, *(design for _, design, _ in rows)])
+    inner = whole.T @ np.linalg.solve(more, whole)
+    rhs = whole.T @ np.linalg.solve(more, y)
+    weighted, every = one.gram.with_instability(TAU), np.arange(WIDTH)
+    assert_agree(weighted.matrix(every, every), inner[:WIDTH, :WIDTH])
+    assert_agree(weighted.rhs(None), rhs)
+    assert weighted.square == pytest.approx(y @ np.linalg.solve(more, y), rel=1e-9)
+    assert weighted.log_det == pytest.approx(plain.gram.with_instability(TAU).log_det)
+
+
+def test_of_what_is_known_before_only_wanted_columns_count() -> None:
+    design = np.array([[1.0, 0.0, 2.0], [0.0, 0.0, 3.0]])
+    known = KnownRows.of(design, np.array([4.0, 6.0]), np.diag([4.0, 9.0]))
+    np.testing.assert_array_equal(known.columns, [0, 2])
+    np.testing.assert_allclose(known.design, [[0.5, 1.0], [0.0, 1.0]])
+    np.testing.assert_allclose(known.residual, [2.0, 2.0])
+    some = SimpleNamespace(
+        width=3,
+        known=known,
+        window_positions=np.arange(1),
+        window_error=np.zeros((1, 6)),
+        unoriented=np.zeros(1, bool),
+    )
+    found = gram([], cast(Dictionary, some), np.zeros(3), (), np.array([2, 1]))
+    np.testing.assert_allclose(found.within, [[0.0, 0.0], [0.0, 2.0]])
+    np.testing.assert_allclose(found.rhs, [0.0, 4.0])
+    assert found.square == pytest.approx(8.0)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,9 +17,11 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.sets import Sets
+from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.posterior import held_out
 from fieldcal.model.posterior.held_out import (
     HeldOut,
+    candidate_sets,
     folds,
     held_out_residuals,
     held_out_turn_residuals,
@@ -25,6 +29,7 @@ from fieldcal.model.posterior.held_out import (
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
+from fieldcal.physics.experience_rows import select_rows
 
 ROWS = 3 * len(LADDER)
 
@@ -257,3 +262,52 @@ def test_squares_are_those_of_the_covariance() -> None:
 
 def test_where_nothing_turned_no_turn_is_foretold() -> None:
     assert held_out_turn_residuals(refit(()).fitted, []).shape == (0,)
+
+
+def test_sets_that_are_compared_are_the_best_and_the_likeliest_beside_it() -> None:
+    """Six within twenty of it, each once, and the empty set however unlikely."""
+
+    @dataclass(eq=False)
+    class Scored:
+        score: float
+        members: tuple[None, ...]
+
+    def one(score: float, members: int = 1) -> Set:
+        return cast(Set, Scored(score, (None,) * members))
+
+    best, empty, far = one(10.0), one(-500.0, 0), one(-10.1)
+    near = [one(10.0 - 2.8 * k) for k in (3, 1, 2, 7)]
+    found = candidate_sets(best, [far, empty, *near, best])
+    ranked = [near[1], near[2], near[0], near[3]]
+    assert found == [best, *ranked, empty]
+    many = [one(9.0 - k) for k in range(9)]
+    assert candidate_sets(best, [*many[::-1], empty]) == [best, *many[:6], empty]
+    assert candidate_sets(empty, [empty]) == [empty]
+
+
+def test_estimates_of_random_groups_are_told_apart_by_their_place() -> None:
+    """Of permanent groups in their order; columns of two of them add up."""
+    columns = ((0, 1), (4, 2), (3,), (2, 1))
+    groups = [SimpleNamespace(columns=np.array(at), random=k % 2 == 1)
+              for k, at in enumerate(columns)]  # fmt: skip
+    d = cast(Dictionary, SimpleNamespace(width=6, always=groups))
+    state = SimpleNamespace(estimate=np.arange(1.0, 10.0))
+    found = held_out._random_estimate(cast(Set, SimpleNamespace(state=state)), d)
+    np.testing.assert_array_equal(found, [0.0, 7.0, 4.0 + 6.0, 0.0, 3.0, 0.0])
+
+
+def test_of_few_windows_each_stretch_is_foretold_from_the_others() -> None:
+    """Stretches of neighbouring rows, as even as they come; of many, whole windows."""
+    x = select_rows(ladder(55), range(110))
+    few = SimpleNamespace(x=x, window_positions=np.array([0, 1]))
+    found = folds(cast(Dictionary, few))
+    parts = held_out.STRETCHES_PER_WINDOW
+    for p in range(2):
+        own = found[x.position == p]
+        assert np.count_nonzero(np.diff(own)) == parts - 1
+        first = [0, *(np.flatnonzero(np.diff(own)) + 1)]
+        assert own[first].tolist() == [i % held_out.MAX_FOLDS for i in range(parts)]
+        lengths = np.diff([*first, len(own)])
+        assert lengths.max() - lengths.min() <= 1
+    whole = folds(dictionary(ladder(3)))
+    np.testing.assert_array_equal(whole, ladder(3).position % held_out.MAX_FOLDS)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small_sessions import Session, ladder
 
+from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior import probabilities
@@ -156,3 +157,37 @@ def test_an_effect_of_everything_is_on_both_triads() -> None:
     acc = CAUSES["bias_drift:acc"]
     assert ProbableCause("a", ((acc, acc.variants[0]),), 1.0, ()).triads == {"acc"}
     assert replace(one, members=((acc, acc.variants[0]),)).kind == "effect"
+
+
+@pytest.mark.parametrize(
+    ("name", "has"),
+    [("warm_up", True), ("settling", True), ("joint_creep", True),
+     ("bias_step", False), ("temperature_bias", False)],
+)  # fmt: skip
+def test_a_time_constant_is_of_a_session_a_turn_or_a_joint(
+    name: str, has: bool
+) -> None:
+    """An instant is none, and a coefficient has no shape."""
+    group = replace(CAUSES["settling:acc"].variants[5], effect=catalogue()[name])
+    assert probabilities._has_time_constant(group) == has
+
+
+def test_sets_near_the_best_are_varied_and_no_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The best among them; of nothing there is nothing to vary."""
+    search, best = drifting()
+    varied: list[tuple[Set, float]] = []
+    monkeypatch.setattr(
+        probabilities, "visit_variations", lambda _, *there: varied.append(there)
+    )
+    far = [s for s in search.sets.visited.values()
+           if s.score <= best.score - probabilities.MAX_LOG_DISTANCE]  # fmt: skip
+    assert far and best.members
+    Posterior(search, best)
+    sets = [one for one, _ in varied]
+    assert best in sets and not any(one in far for one in sets)
+    assert {top for _, top in varied} == {best.score}
+    varied.clear()
+    Posterior(search, search.sets.evaluate(()))
+    assert varied == []

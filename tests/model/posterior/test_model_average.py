@@ -18,6 +18,7 @@ from fieldcal.model.posterior.model_average import (
     ModelAverage,
     average_of_columns,
     average_over_sets,
+    eliminate_with_groups,
 )
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.size_average import average_over_sizes
@@ -115,6 +116,42 @@ def test_what_is_in_no_set_counts_as_if_it_were() -> None:
     has = SESSION.search(off).sets.evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
     known = average_of_columns([(has, 1.0)], told, [left])[1]
     np.testing.assert_array_equal(known, average_of_columns([(has, 1.0)], told)[1])
+
+
+def test_what_is_in_no_set_is_eliminated_beside_it() -> None:
+    """Once, with its own prior; the evidence is that of the whole."""
+    group = QUADRATIC.variants[0]
+    left = ASYMMETRY.variants[0]
+    left = replace(left, part=ASYMMETRY.name, typical=np.full(len(left.columns), 2e-3))
+    off = SESSION.noise(np.random.default_rng(9))
+    search = SESSION.search(off)
+    lacks = search.sets.evaluate(((QUADRATIC, group),))
+    has = search.sets.evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
+    whole = eliminate_with_groups(lacks, [left])
+    columns = np.concatenate([lacks.state.columns, left.columns])
+    np.testing.assert_array_equal(whole.columns, columns)
+    wide = np.concatenate([lacks.state.prior_sigma, left.typical])
+    rows = lacks.state.rows
+    inner = rows.matrix(columns, columns) + np.diag(wide**-2.0)
+    np.testing.assert_allclose(whole.inverse, np.linalg.inv(inner), 1e-6, 1e-20)
+    expected = np.linalg.solve(inner, rows.rhs(columns))
+    np.testing.assert_allclose(whole.estimate, expected, rtol=1e-6, atol=1e-12)
+    same = eliminate_with_groups(has, [left])
+    np.testing.assert_array_equal(same.columns, has.state.columns)
+
+
+def test_numbers_of_columns_are_those_of_all_sets_with_what_they_lack() -> None:
+    average, _ = average_of(search_of(np.array([3e-5, 0.0, 1e-5]), 1))
+    group = ASYMMETRY.variants[0]
+    left = replace(group, part=ASYMMETRY.name, typical=np.full(3, 2e-3))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(average.posterior.sets.dictionary, "unfitted", (left,))
+        mean, cov = average.average_of_columns(BIAS)
+    expected, spread = average_of_columns(average.sets, BIAS, [left])
+    np.testing.assert_allclose(mean, expected)
+    np.testing.assert_allclose(cov, spread)
+    plain = average_of_columns(average.sets, BIAS)[1]
+    assert (np.diag(spread) / np.diag(plain)).max() > 1.1
 
 
 def test_numbers_of_a_member_are_those_of_the_sets_that_have_it() -> None:

@@ -21,6 +21,7 @@ from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.model.rows import base_sway
 from fieldcal.model.rows.base_sway import find_base_sway
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
@@ -148,7 +149,7 @@ def test_a_part_of_a_slow_wave_is_no_drift() -> None:
     for held in (pier.held()[2], pier.held()[4]):
         some = (block.t >= held.start) & (block.t < held.end)
         t, six = block.t[some], block.six[some]
-        (found,) = find_sway(t, six, np.ones(3))
+        (found,) = find_sway(t, six)
         s = (t - t.mean()) / np.ptp(t) * 2
         left = six - found.outputs(t) - firm.six[some]
         assert np.abs(left[:, :3].T @ s / (s @ s)).max() < 1e-3
@@ -159,7 +160,7 @@ def test_beating_waves_have_no_arm() -> None:
     waves = "sway:amplitude_deg=1,hz=0.1008,spread_hz=0.01008,phase_deg=97.12,"
     block = played(100, f"{waves}azimuth_deg=7.375")
     some = (block.t >= positions()[4]["start_s"]) & (block.t < positions()[4]["end_s"])
-    (found,) = find_sway(block.t[some], block.six[some], np.ones(3))
+    (found,) = find_sway(block.t[some], block.six[some])
     assert np.abs(found.arm).max() < 3.0
 
 
@@ -209,11 +210,79 @@ def test_two_stretches_of_a_window_are_as_uncertain_as_their_mean() -> None:
     assert found is not None
     for (start, end), excess in zip(held, found.excess_variance, strict=True):
         some = (t >= start) & (t < end)
-        parts = find_sway(t[some], six[some], np.ones(3))
+        parts = find_sway(t[some], six[some])
         assert len(parts) == 1 + (end - start > 40)
         # means of independent stretches of the same length
         draws = np.array([one.excess_variance for one in parts])
         np.testing.assert_allclose(excess, draws.mean(axis=0) / len(parts), rtol=0.05)
+
+
+def test_what_a_window_is_too_short_to_show_is_what_waves_leave_in_its_mean() -> None:
+    """Of any phase; three quarters of a period are as bad as the average window.
+
+    In the outputs' own units, as the windows that show it.
+    """
+    rng, rate, hz = np.random.default_rng(2), 25.0, 0.1
+    unit = np.array([2.0, 2.0, 2.0, -50.0, -50.0, -50.0])
+    t = np.arange(0.0, 110.0, 1 / rate)
+    turned = np.deg2rad(0.9) * np.sin(2 * np.pi * hz * t)
+    six = rng.normal(size=(len(t), 6)) * NOISE
+    six[:, 1] += G0 * np.cos(turned)
+    six[:, 2] -= G0 * np.sin(turned)
+    six[:, 3] += np.gradient(turned, t)
+    six *= unit
+    held = [(2.0, 32.0), (40.0, 70.0), (78.0, 85.5)]
+    about = description.parse_description(
+        {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
+                      for a, b in held],
+         "nominal": {"acc_scale": unit[:3].tolist(), "gyr_scale": unit[3:].tolist()}}
+    )  # fmt: skip
+    block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
+    found = find_base_sway(block, about)
+    assert found is not None
+    phase = np.linspace(0.0, 2 * np.pi, 360, endpoint=False)
+    inside = np.linspace(0.0, 7.5, 2001)
+    wave = np.sin(2 * np.pi * hz * inside + phase[:, None]).mean(axis=1)
+    angle = np.deg2rad(0.9) * np.sqrt((wave**2).mean())
+    expected = angle * np.repeat([about.gravity, 2 * np.pi * hz], 3) * np.abs(unit)
+    np.testing.assert_allclose(np.sqrt(found.excess_variance[2]), expected, rtol=0.02)
+    assert (found.excess_variance[0] < 0.1 * found.excess_variance[2]).all()
+
+
+@pytest.mark.parametrize("unit", [[2.0, 2.0, 2.0, 8.0, 8.0, 8.0],
+                                  [-1.0, 1.0, 1.0, 1.0, -1.0, -4.0]])  # fmt: skip
+def test_sway_is_the_same_in_any_unit_and_of_axes_that_are_mirrored(
+    unit: list[float],
+) -> None:
+    """Forces and rates make one rotation only in axes of one handedness."""
+    rng, rate = np.random.default_rng(2), 25.0
+    t = np.arange(0.0, 75.0, 1 / rate)
+    turned = np.deg2rad(0.9) * np.sin(2 * np.pi * 0.31 * t)
+    six = rng.normal(size=(len(t), 6)) * NOISE
+    six[:, 1] += G0 * np.cos(turned)
+    six[:, 2] -= G0 * np.sin(turned)
+    six[:, 3] += np.gradient(turned, t)
+    held = [(2.0, 32.0), (40.0, 70.0)]
+    about = description.parse_description(
+        {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
+                      for a, b in held]}
+    )  # fmt: skip
+    block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
+    plain = find_base_sway(block, about)
+    scaled = {"acc_scale": np.array(unit[:3]), "gyr_scale": np.array(unit[3:])}
+    other = replace(about, nominal={**about.nominal, **scaled})
+    found = find_base_sway(block.with_six(block.six * unit), other)
+    assert plain is not None and found is not None
+    assert found.amplitude == pytest.approx(plain.amplitude, rel=1e-6)
+    np.testing.assert_allclose(found.block.six / unit, plain.block.six, atol=1e-9)
+    variance = found.excess_variance / np.square(unit)
+    np.testing.assert_allclose(variance, plain.excess_variance, rtol=1e-6)
+    np.testing.assert_allclose(found.white, plain.white * np.abs(unit), rtol=1e-6)
+
+
+def test_a_window_without_samples_leaves_nothing() -> None:
+    one = np.array([7.0])
+    assert not base_sway._unseen_sway_variance(np.array([1e-4, 1e-4]), one).any()
 
 
 @pytest.mark.thorough

@@ -10,6 +10,7 @@ import pytest
 from small_sessions import LADDER, SD, ladder, rows_of
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows import hand_tremor
 from fieldcal.model.rows.hand_tremor import force_wander_angle, turned_force
 from fieldcal.model.rows.hand_tremor import rows_of_recording as rows_in_a_hand
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
@@ -122,7 +123,7 @@ def test_in_a_hand_each_window_is_one_row() -> None:
     for i, start in enumerate(STEADY[:5]):
         some = source.block.between(start, start + SECONDS)
         np.testing.assert_allclose(found.y[i], some.six.mean(axis=0), atol=1e-12)
-        np.testing.assert_allclose(found.x.variance[i], some.acc.var(axis=0))
+        np.testing.assert_allclose(found.x.variance[i], some.acc.var(axis=0) / 4)
     np.testing.assert_allclose(found.sd[:, :3], np.tile(found.noise[:3], (5, 1))
                                / 500**0.5, rtol=1e-9)  # fmt: skip
     assert found.hand_angle.shape == (5, 3)
@@ -130,6 +131,31 @@ def test_in_a_hand_each_window_is_one_row() -> None:
     assert (
         found.window_error.shape == (5, 6) and (found.window_error[:, 3:] > 4e-5).all()
     )
+
+
+UNIT = np.array([4.0, -0.5, 8.0])
+
+
+@pytest.mark.parametrize("kind", ["calm", "quick", "some"])
+def test_the_unit_of_gyroscopes_changes_no_angle(kind: str) -> None:
+    """Errors of their means are in that unit, as the means are."""
+    angles = np.full((5, 3), 5e-3)
+    if kind == "some":
+        angles = np.zeros((12, 3))
+        angles[7] = 3e-3
+    source = recording(angles, band=SLOWLY if kind == "calm" else QUICKLY)
+    nominal = {**source.about.nominal, "gyr_scale": UNIT}
+    block = replace(source.block, gyr=source.block.gyr * UNIT)
+    about = replace(source.about, nominal=nominal)
+    plain = rows_in_a_hand(source)
+    found = rows_in_a_hand(replace(source, block=block, about=about))
+    assert plain.hand_angle.any()
+    np.testing.assert_allclose(found.hand_angle, plain.hand_angle, rtol=1e-5)
+    np.testing.assert_allclose(found.sd[:, :3], plain.sd[:, :3], rtol=1e-5)
+    np.testing.assert_allclose(found.sd[:, 3:], plain.sd[:, 3:] * np.abs(UNIT), 1e-5)
+    np.testing.assert_allclose(found.y[:, 3:], plain.y[:, 3:] * UNIT, rtol=1e-5)
+    wide = plain.window_error[:, 3:] * np.abs(UNIT)
+    np.testing.assert_allclose(found.window_error[:, 3:], wide)
 
 
 def off_and_told(angles: Array, seeds: range) -> tuple[Array, Array]:
@@ -326,3 +352,30 @@ def test_gyroscopes_alone_show_a_hand_as_well() -> None:
     found = rows_in_a_hand(replace(source, block=block, usable=usable))
     assert not found.x.f.any() and found.hand_angle[7].any()
     assert np.isfinite(found.sd[:, 3:]).all()
+
+
+def test_what_noise_walks_by_is_taken_off_a_tremor() -> None:
+    """An integral of white noise about a line, by (2); in the mean of many."""
+    rng, length, count = np.random.default_rng(6), 4.0, 200
+    sigma = np.array([0.3, 2.0])
+    white = sigma / np.sqrt(count)
+    wave = 5.0 * np.cos(2 * np.pi * 1.5 * length * (np.arange(count) + 0.5) / count)
+    wave *= 2 * np.pi * 1.5
+    square = np.zeros((2, 2))
+    for _ in range(300):
+        noise = sigma * rng.standard_normal((count, 2))
+        for k, values in enumerate((noise, noise + wave[:, None])):
+            square[k] += hand_tremor._tremor_rms(values, length, white) ** 2 / 300
+    walked = (white * length) ** 2 / 15
+    assert (square[0] < 0.5 * walked).all()
+    np.testing.assert_allclose(square[1], 25.0 / 2, rtol=0.05)
+
+
+def test_a_force_that_scatters_as_its_noise_does_is_held_by_no_hand() -> None:
+    """Of fifty seeds in one at most; a hand turns it by three times as much."""
+    x, found = ladder(12, EVERY), []
+    for seed in range(50):
+        rng = np.random.default_rng(seed)
+        y = np.hstack([x.f, x.w]) + SD * rng.standard_normal((len(x), 6))
+        found.append(force_wander_angle(rows_of(x, y)))
+    assert np.count_nonzero(found) <= 1

@@ -8,6 +8,7 @@ import pytest
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
+from fieldcal.model.rows import turntable
 from fieldcal.model.rows.turntable import fit_rotating_earth_rate
 
 AXIS = np.array([1.0, 2.0, -2.0]) / 3.0
@@ -95,3 +96,31 @@ def test_of_less_than_a_turn_the_mean_keeps_what_nobody_can_tell(
     size = 2 / 3 * EARTH_RATE**2 * share
     expected = size * (np.eye(3) - np.outer(AXIS, AXIS))
     np.testing.assert_allclose(found.covariance, expected, rtol=1e-9)
+
+
+def test_a_bias_is_what_makes_rates_of_known_lengths() -> None:
+    """Of eight positions in which the Earth's rate points anywhere, and of a table."""
+    rng = np.random.default_rng(4)
+    along = rng.normal(size=(8, 3))
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    for bias, length in (
+        (1e-2 * BIAS, np.full(8, EARTH_RATE)),
+        (BIAS, np.linspace(0.2, 0.7, 8)),
+    ):
+        rates = bias + along * length[:, None]
+        found, known = turntable._bias_from_norms(rates, length)
+        assert known
+        np.testing.assert_allclose(found, bias, rtol=1e-6)
+    few, known = turntable._bias_from_norms(rates[:3], length[:3])
+    assert not known and not few.any()
+    level = along * [1.0, 1.0, 0.0]
+    flat, known = turntable._bias_from_norms(
+        BIAS + level, np.linalg.norm(level, axis=1)
+    )
+    assert not known and not flat.any(), "nothing about the third axis"
+
+
+def test_a_rate_that_is_none_points_anywhere() -> None:
+    np.testing.assert_array_equal(turntable._unit(np.array([0.0, 3.0, -4.0])),
+                                  [0.0, 0.6, -0.8])  # fmt: skip
+    assert np.linalg.norm(turntable._unit(np.zeros(3))) == 1.0

@@ -139,3 +139,24 @@ def test_samples_that_are_missing_do_not_hide_a_line() -> None:
     few = piece[:63]
     np.testing.assert_array_equal(without_lines(few, 100.0), few)
     assert np.ptp(without_lines(several(7.77)[:200], 100.0)) < 20.0
+
+
+def test_outputs_that_are_loud_do_not_spoil_a_line_of_others() -> None:
+    """Of amplitude, phase and frequency of a line by its own noise, and of no unit."""
+    sigma = np.array([1.0, 0.3, 1e-4])
+    noise = sigma * np.random.default_rng(5).standard_normal((1600, 3))
+    line = np.outer(np.sin(2 * np.pi * 7.77 * T + 0.4), [0.0, 0.0, 2e-3])
+    off = without_lines(line + noise, 100.0) - noise
+    # a sine that three numbers fit has the error of three, and one more for the mean
+    assert np.sqrt((off[:, 2] ** 2).mean()) < 3e-4 * np.sqrt(4 / 1600)
+    unit = np.array([1e-3, 1e3, 1e6])
+    other = without_lines((line + noise) * unit, 100.0) / unit - noise
+    np.testing.assert_allclose(other[:, 2], off[:, 2], atol=1e-8)
+
+
+def test_the_usual_noise_is_that_of_the_quieter_quarter() -> None:
+    """Of four windows the quietest, though the other three are alike."""
+    six = six_of()[: 4 * N]
+    six[N:, :3] += 0.02 * np.random.default_rng(8).standard_normal((3 * N, 3))
+    found = quiet_window_noise(block_of(six), WINDOWS[:4], RATE)
+    np.testing.assert_allclose(found.white, WHITE, rtol=0.15)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,12 +12,15 @@ from small_sessions import LADDER, SD, Session, dictionary, ladder, nominal, row
 
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
+from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult
+from fieldcal.model.search.offer import OfferTable
 from fieldcal.model.search.offered_pairs import offered_pairs
 from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import Search
@@ -91,6 +95,41 @@ def test_what_a_part_told_is_begun_with_and_what_it_told_wrongly_is_dropped(
     assert found.best.keys == {"settling:acc"}
     (group,) = (g for _, g in found.best.members)
     assert group.shape["tau_s"] == pytest.approx(TAU, rel=0.05)
+
+
+def test_a_set_that_is_held_is_not_searched_beside(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its members are of another dictionary; the state is that with them alone."""
+    told, fit = settling(), fit_of(state_of(SETTLING))
+    monkeypatch.setattr(Search, "run", None)
+    found = Inference(fit).hold(told.best.members)
+    ((cause, group),) = found.best.members
+    assert cause.key == "settling:acc" and cause in fit.dictionary.causes
+    (term,) = found.state.terms
+    assert term.effect is EFFECTS["settling"] and term.shape == group.shape
+    assert found.visited_keys == frozenset() and found.fit is fit
+    assert len(found.values) == fit.dictionary.width
+    own = term.values[list(group.params)]
+    np.testing.assert_allclose(own, found.values[group.columns], atol=1e-12)
+    assert found.turn_rows == [] and found.contradicted_turns == ()
+    # on the grid the time constant is not quite what it was refined to
+    assert chi2(found) == pytest.approx(1.0, abs=0.3)
+    nothing = Inference(fit_of(state_of(SETTLING))).hold(())
+    assert nothing.best.members == () and nothing.state.terms == ()
+    assert chi2(nothing) > 10
+
+
+def test_a_better_set_is_gone_on_from_until_one_comes_again() -> None:
+    told = settling()
+    fit = fit_of(state_of(SETTLING))
+    start = Inference(fit).hold(())
+    found = Inference(fit).resume(start.best, start)
+    assert found.best.keys == told.best.keys
+    assert chi2(found) == pytest.approx(1.0, abs=0.2)
+    (_, group), (_, other) = (r.best.members[0] for r in (found, told))
+    assert group.shape["tau_s"] == pytest.approx(other.shape["tau_s"], rel=0.02)
+    assert Sets.key(start.best.members) in found.visited_keys
 
 
 def test_the_state_is_what_the_columns_say() -> None:
@@ -229,6 +268,91 @@ def test_what_begins_at_a_refined_instant_may_be_of_any_kind() -> None:
         assert then == {g.params for g in other.variants}, key
 
 
+def shared_step(
+    seed: int,
+) -> tuple[Refinement, tuple[tuple[Cause, Group], ...], float]:
+    """Both triads jump at one instant; a set has the jumps at two others."""
+    x = ladder(6)
+    d = dictionary(x)
+    rows = np.flatnonzero(x.position == 6)
+    instant = float(x.t[rows[2:4]].mean())
+    later = (x.t > instant)[:, None]
+    y = np.hstack([x.f, x.w]) + later * np.r_[0.0, 0.03, 0.0, 0.0, 0.0, 2e-3]
+    y += SD * np.random.default_rng(seed).standard_normal(y.shape)
+    fit = GaussNewton(WindowSystem(rows_of(x, y), d), nominal())
+    members = []
+    for key, param, off in (("bias_step:acc", 1, -60.0), ("bias_step:gyr", 5, 50.0)):
+        cause = next(c for c in d.causes if c.key == key)
+        near = [g for g in cause.variants if g.params == (param,)]
+        at = np.abs([g.shape["at_s"] - instant - off for g in near])
+        members.append((cause, near[int(np.argmin(at))]))
+    own = tuple(members)
+    state, values, found = fit.settle(nominal(), np.zeros(d.width), own)
+    return Refinement(fit, state, values, found.sizes), own, instant
+
+
+def test_members_that_begin_together_are_moved_together() -> None:
+    """To the likelier of their instants first, and on from there."""
+    refinement, own, instant = shared_step(3)
+    begins = {g.shape["at_s"] for _, g in own}
+    assert len(begins) == 2 and min(abs(t - instant) for t in begins) > 5
+    found = refinement.refine_shape(own, [0, 1])
+    (at,) = {g.shape["at_s"] for _, g in found}
+    assert [c.key for c, _ in found] == [c.key for c, _ in own]
+    assert [g.params for _, g in found] == [(1,), (5,)]
+    scores = refinement._scores(
+        refinement._trial_sets(own, [0, 1], [*sorted(begins), at])[1:]
+    )
+    assert scores[2] >= max(scores)
+    assert scores[2] > max(scores[:2]) or at in begins
+    # of one alone the other stays where it is
+    ((_, moved), (_, kept)) = refinement.refine_shape(own, [0])
+    assert kept is own[1][1] and moved.params == (1,)
+    # a jump has no parabola, and no time constant
+    assert all(np.isnan(g.shape_sigma) for _, g in found)
+
+
+def test_the_largest_step_is_that_of_the_state_in_its_deviations() -> None:
+    """Of bias and scale factor and of effects; not of what the state does not have."""
+    found, d = settling(), settling().fit.dictionary
+    walk = next(c for c in d.causes if c.key == "random_walk:gyr")
+    members = (*found.best.members, (walk, walk.variants[0]))
+    beside = found.search.sets.evaluate(members)
+    state = beside.state
+    sigma = np.sqrt(np.diag(state.inverse))
+    kept = [g for g in [*d.always, *(g for _, g in members)] if g.in_state]
+    inside = np.unique(np.concatenate([g.columns for g in kept]))
+    outside = np.setdiff1d(state.columns, inside)
+    assert len(outside)
+    values = np.zeros(d.width)
+    for column, times in ((d.bias + 2, 3.0), (d.scale + 1, -5.0)):
+        at = int(np.flatnonzero(state.columns == column)[-1])
+        values[column] = times * sigma[at]
+        step = found.fit.largest_step(beside, np.zeros(d.width), values)
+        assert step == pytest.approx(abs(times))
+        back = found.fit.largest_step(beside, values, np.zeros(d.width))
+        assert back == pytest.approx(abs(times))
+    values[outside] = 1e3
+    assert found.fit.largest_step(beside, values * 0, values) == pytest.approx(5.0)
+
+
+def test_a_position_that_lies_elsewhere_is_turned_in_the_state() -> None:
+    """Without angles, by what the set leaves of its force, along its own two axes."""
+    x = ladder(6, (2,))
+    d = dictionary(x)
+    small = np.zeros((len(LADDER), 2))
+    small[2] = 4e-4, -7e-4
+    true = replace(nominal(), small_rotation=small)
+    y = true.output(true.experienced(x), d.since)
+    fit = GaussNewton(WindowSystem(rows_of(x, y), d), nominal())
+    fitted, _ = fit.estimate(nominal(), np.zeros(d.width), ())
+    state, values = fit.state_at_estimate(fitted)
+    np.testing.assert_allclose(state.small_rotation[2], small[2], rtol=0.02)
+    np.testing.assert_array_equal(values[d.rotations].reshape(-1, 2),
+                                  state.small_rotation)  # fmt: skip
+    assert not np.delete(state.small_rotation, 2, axis=0).any()
+
+
 # --- two at a time
 
 KEYS = ("angle_offset", "quadratic", "g_sensitivity", "bias_drift:acc",
@@ -264,6 +388,53 @@ def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
     assert found.score >= max(s.score for s in every) - 0.5
     assert found.score >= max(scores) - 1.0
     assert search._with_two_more(empty, np.inf) is empty, "none comes near"
+
+
+def test_the_score_of_a_pair_is_that_of_its_sizes() -> None:
+    """Evidence, density of both sizes, and the chance of both causes."""
+    search, empty = drawn(0)
+    density = np.log(priors.density())
+    seen = 0
+    for table in search.offers.tables(empty):
+        before = table.state
+        for pair in offered_pairs(search.sets, empty, table, -np.inf):
+            columns, sigma = [before.columns], [before.prior_sigma]
+            total = -before.score + table.score
+            for offer in (pair.first, pair.second):
+                group = offer.member[1]
+                columns.append(group.columns)
+                sigma.append(group.prior_sigma(float(priors.SIZES[offer.size])))
+                total += density[offer.size]
+            both = Eliminated.of(
+                before.rows, np.concatenate(columns), np.concatenate(sigma)
+            )
+            members = (pair.first.member, pair.second.member)
+            chance = search.sets.set_log_prior(members) - search.sets.set_log_prior(())
+            assert pair.score == pytest.approx(both.score + total + chance, abs=1e-6)
+            seen += pair.first.size != pair.second.size
+    assert seen > 5
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_only_pairs_that_cannot_reach_a_score_are_left_out(seed: int) -> None:
+    """Whatever the score of the set itself is, and whatever its sign."""
+    search, empty = drawn(seed)
+    whole = max(search.offers.tables(empty), key=lambda table: len(table.offers))
+    assert len(whole.offers) > 3
+    for level in (whole.score, 40.0, -40.0):
+        table = replace(whole, score=level)
+
+        def scores(least: float, table: OfferTable = table) -> dict[Any, float]:
+            pairs = offered_pairs(search.sets, empty, table, least)
+            return {(p.keys, p.first.member, p.second.member): p.score for p in pairs}
+
+        every = scores(-np.inf)
+        least = float(np.median([*every.values()]))
+        kept = scores(least)
+        assert {k for k, s in every.items() if s >= least} <= set(kept)
+        assert all(every[k] == pytest.approx(s) for k, s in kept.items())
+        assert len(kept) < len(every)
+        assert not scores(max(every.values()) + 50.0)
 
 
 class Watched(Search):

@@ -299,3 +299,32 @@ def test_several_effects_are_likelier_than_a_function_that_none_makes(
     search.sets.visited[()] = replace(empty, score=-9.0)
     assert search._prefer_effects(sets["alpha:ay"]) is sets[told]
     assert search._prefer_effects(sets["settling:acc"]) is sets["settling:acc"]
+
+
+def test_instead_of_a_function_two_causes_are_tried_beside_all_parameters_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A function may do what a parameter does that a cause was not given."""
+    drift, wave = CAUSES["bias_drift:gyr"], CAUSES["alpha:ay"]
+    part = next(g for g in drift.variants if len(g.params) == 1)
+    search = SESSION.search(SESSION.noise(np.random.default_rng(1)))
+    current = search.sets.evaluate(((drift, part), (wave, wave.variants[0])))
+    asked: list[tuple[str, Set, float]] = []
+    for name in ("_with_two_more", "_with_one_more"):
+
+        def noted(there: Set, level: float, name: str = name) -> Set:
+            asked.append((name, there, level))
+            return there
+
+        monkeypatch.setattr(search, name, noted)
+    found = search._without_function(current)
+    assert all(level == current.score for *_, level in asked)
+    tried = [(name, [g for _, g in there.members]) for name, there, _ in asked]
+    whole = drift.full_variant(part)
+    assert whole is not part
+    two, one = "_with_two_more", "_with_one_more"
+    assert tried == [(two, [part]), (one, [part]), (two, [whole]), (one, [whole])]
+    assert found.score == max(current.score, *(there.score for _, there, _ in asked))
+    asked.clear()
+    plain = search.sets.evaluate(((drift, part),))
+    assert search._without_function(plain) is plain and not asked

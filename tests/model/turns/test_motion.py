@@ -144,3 +144,29 @@ def test_single_samples_that_may_not_be_used_are_as_if_they_were_missing() -> No
     assert not TurnTracker(broken, rows, np.zeros((1, len(rows.x)))).legs
     nothing = replace(source, usable=np.zeros_like(lost))
     assert source.complete_samples is source and nothing.complete_samples is nothing
+
+
+@pytest.mark.parametrize("size", [0.5, 5e-3, 2e-3])
+@pytest.mark.parametrize("unit", [[0.25] * 3, [-8.0] * 3, [4.0, 0.5, 2.0]])
+def test_the_unit_of_gyroscopes_moves_no_bounds(size: float, unit: list[float]) -> None:
+    source, rows = recorded(turning(2000, 2500, size))
+    expected = motion_bounds(source, rows, (0, 1), *GAP)
+    block = replace(source.block, gyr=source.block.gyr * unit)
+    nominal = {**source.about.nominal, "gyr_scale": np.array(unit)}
+    other = replace(source, block=block, about=replace(source.about, nominal=nominal))
+    assert motion_bounds(other, reduce_to_rows(other), (0, 1), *GAP) == expected
+    assert (expected == GAP) == (size < 6e-3), "twice 3e-3 rad/s"
+
+
+def test_a_motion_stands_out_of_the_noise_of_its_own_axis() -> None:
+    """Of an axis that is a hundred times as loud no limit of another one says so."""
+    source, _ = recorded(np.zeros(5000))
+    gyr = source.block.gyr.copy()
+    gyr[:, 2] *= 400.0
+    gyr[2000:2011, 2] += 0.16
+    loud = replace(source, block=replace(source.block, gyr=gyr))
+    rows = reduce_to_rows(loud)
+    limit = 8 * rows.noise[5] / np.sqrt(10)
+    mean = np.convolve(gyr[slice(*GAP), 2], np.ones(10) / 10, "valid")
+    assert limit < np.abs(mean - rows.y[-1, 5]).max() < 2 * limit
+    assert motion_bounds(loud, rows, (0, 1), *GAP) == GAP

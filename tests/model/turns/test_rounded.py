@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.model.turns import rounded
 from fieldcal.model.turns.rounded import StandingOutputs, find_standing_outputs
 
 STEP, RATE, N, EACH = 0.02, 100.0, 400, 2
@@ -139,3 +140,55 @@ def test_a_dead_band_hides_on_the_way_what_it_hides_at_rest() -> None:
     assert (np.abs(hidden) > 0.1 * band).all() and share[150:200, 0].max() < 0.1
     same = np.tile(np.eye(3), (len(edge), 1, 1))
     assert not found.closure_covariance(t[on], gyr[on], SCALE, edge, same).any()
+
+
+def test_runs_beside_the_value_of_windows_add_up_one_by_one() -> None:
+    """(1) sample by sample: three steps up, one of them turned back from."""
+    scale, dt = np.array([2.0, -0.5, 1.0]), 0.01
+    lengths = [5, 4, 2, 8, 3, 6]
+    values = [0, 1, 2, 3, 2, 0]
+    gyr = np.zeros((28, 3))
+    gyr[:, 0] = STEP * np.repeat(values, lengths)
+    gyr[:, 1] = -2.0 * STEP  # not that of windows, and never another one
+    gyr[:, 2] = STEP * np.arange(28)  # of no grid: noise hides its steps
+    edge = np.arange(0, 29, 4)[:-1]
+    rng = np.random.default_rng(2)
+    attitude = Rotation.random(len(edge), random_state=rng).as_matrix()
+    variance = np.array([3e-5, 5e-5, 7e-5])
+    one = StandingOutputs(np.zeros(3), np.array([STEP, STEP, 0.0]), variance)
+    found = one.closure_covariance(dt * np.arange(28), gyr, scale, edge, attitude)
+    expected = np.zeros((3, 3))
+    starts = np.cumsum([0, *lengths])
+    n = [float(length) for length in lengths]
+    share = [0.0, (n[1] / n[2] - n[1] / n[0]) ** 2 / 12,
+             (n[2] / n[3] - n[2] / n[1]) ** 2 / 12, 1.0,
+             (n[4] / n[5] - n[4] / n[3]) ** 2 / 12, 0.0]  # fmt: skip
+    assert max(share[1:3]) < 1 < n[3]
+    for k, part in enumerate(share):
+        middle = (starts[k] + starts[k + 1]) // 2
+        at = min(int(np.sum(edge < middle)), len(edge) - 1)
+        axis = attitude[at].T @ [1.0, 0.0, 0.0]
+        size = variance[0] * (n[k] * dt / scale[0]) ** 2 * part
+        expected += size * np.outer(axis, axis)
+    axis = attitude[int(np.sum(edge < 14))].T @ [0.0, 1.0, 0.0]
+    expected += variance[1] * (28 * dt / scale[1]) ** 2 * np.outer(axis, axis)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_a_run_that_is_crossed_unevenly_counts_once_at_most() -> None:
+    value, length = np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 40.0, 2.0, 3.0])
+    found = rounded._run_factor(value, length)
+    second = (2.0 * (1 / 3.0 - 1 / 40.0)) ** 2 / 12
+    np.testing.assert_allclose(found, [1.0, 1.0, second, 1.0])
+
+
+def test_a_share_is_that_of_the_samples_about_an_edge() -> None:
+    """Of as many as lie from edge to edge; at the ends of those that there are."""
+    gyr = np.zeros((12, 3))
+    gyr[5:9, 0] = gyr[2:3, 1] = STEP
+    gyr[:, 2] = 0.98 * STEP
+    share = stands().share(gyr, np.array([0, 4, 8, 11]))
+    at = np.abs(gyr) < 0.99 * STEP
+    for row, middle in zip(share, (0, 4, 8, 11), strict=True):
+        some = [k for k in range(middle - 2, middle + 2) if 0 <= k < 12]
+        np.testing.assert_allclose(row, at[some].mean(axis=0))

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.core.samples import Array
-from fieldcal.model.turns.tremor import MIN_SAMPLES, sway_variance
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.reduce import RowSource
+from fieldcal.model.rows.thermometer import Thermometer
+from fieldcal.model.turns.tremor import MIN_SAMPLES, sway_at_ends, sway_variance
+from fieldcal.session.description import parse_description
 
 STEP, SECONDS = 0.01, 10.0
 
@@ -37,3 +40,27 @@ def test_noise_is_no_swaying() -> None:
 
 def test_of_a_few_samples_nothing_is_known() -> None:
     assert sway_variance(rates(2e-3, 1.6, 0.0, 1)[: MIN_SAMPLES - 1], STEP) == 0.0
+
+
+def test_ends_of_a_turn_sway_by_ten_seconds_on_either_side_of_it() -> None:
+    """Their variances add up; a side without all its samples tells nothing."""
+    n = round(SECONDS / STEP)
+    parts = [rates(size, 1.6, 0.0, 1) for size in (9e-3, 2e-3, 7e-3, 3e-3, 8e-3)]
+    unit = np.array([2.0, -4.0, 0.5])
+    gyr = np.vstack(parts) * unit
+    block = Block.of(STEP * np.arange(5 * n), np.zeros_like(gyr), gyr)
+    about = parse_description({"format": 1, "nominal": {"gyr_scale": unit.tolist()}})
+    usable = np.ones((5 * n, 6), dtype=bool)
+    source = RowSource(block, about, usable, np.zeros(1), Thermometer.of(block))
+    windows = np.array([[0, 2 * n], [3 * n, 5 * n]])
+    own = [sway_variance(one, STEP) for one in parts]
+    assert sway_at_ends(source, windows) == pytest.approx(own[1] + own[3])
+    usable[2 * n - 5, 4] = False
+    assert sway_at_ends(source, windows) == pytest.approx(own[3])
+    usable[3 * n + 5, :3] = False  # of the accelerometers alone
+    assert sway_at_ends(source, windows) == pytest.approx(own[3])
+    short = np.array([[2 * n - n // 2, 2 * n - 10], [3 * n, 3 * n + n // 2]])
+    half = [sway_variance(parts[1][n // 2 : -10], STEP),
+            sway_variance(parts[3][: n // 2], STEP)]  # fmt: skip
+    usable[:] = True
+    assert sway_at_ends(source, short) == pytest.approx(sum(half))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -103,7 +104,7 @@ def recorded(*errors: SimulatedEffect) -> tuple[Block, list[HeldWindow]]:
 
 
 def followed(
-    block: Block, windows: list[HeldWindow]
+    block: Block, windows: list[HeldWindow], unit: Array | None = None
 ) -> tuple[GaussNewton, Set, list[TurnRows]]:
     """The fit of a ride, what windows say, and rows of turns about nominal."""
     places = [
@@ -114,6 +115,10 @@ def followed(
         "format": 1, "device": {"name": "turned"}, "position": places,
         "site": {"latitude_deg": 50.45, "height_m": 170.0},
     })  # fmt: skip
+    if unit is not None:
+        scaled = {"acc_scale": unit[:3], "gyr_scale": unit[3:]}
+        about = replace(about, nominal={**about.nominal, **scaled})
+        block = block.with_six(block.six * unit)
     prepared = prepare_recording(block, about)
     fit = build_fit(prepared.source, prepared.rows, prepared)
     d, at_rest = fit.dictionary, np.zeros(fit.dictionary.width)
@@ -227,6 +232,76 @@ def test_a_filter_is_what_its_columns_foretell(acc: float, gyr: float) -> None:
         assert seen > 25 and rest < 0.02 * seen + 1.4 * np.sqrt(len(turn.way))
 
 
+def test_what_an_arm_puts_on_the_way_is_what_turns_make_of_it() -> None:
+    """w x (w x r) + w' x r, and of the other causes of a state nothing."""
+    one, arm = ride("lever_arm"), np.array([0.02, -0.01, 0.03])
+    fit = one.fit
+    assert one.group.effect is not None
+    causes = {c.name: c for c in fit.dictionary.causes}
+    scale = causes["gyro_scale"].variants[0]
+    assert scale.effect is not None
+    terms = (Term(scale.effect, np.full(3, 2e-3)), Term(one.group.effect, arm))
+    state = replace(fit.nominal, terms=terms)
+    turns = fit.turns_at(state)
+    assert len(turns) == len(PLACES) - 1
+    for name, group in (("lever_arm", one.group), ("gyro_scale", scale)):
+        found = fit.outputs_in_turns(turns, state, [(causes[name], group)])
+        for turn, out in zip(turns, found, strict=True):
+            w, change = turn.x.w, turn.x.w_dot
+            expected = np.zeros((len(w), 6))
+            if name == "lever_arm":
+                around = np.cross(w, np.cross(w, arm)) + np.cross(change, arm)
+                expected[:, :3] = around
+            else:
+                expected[:, 3:] = 2e-3 * w
+            np.testing.assert_allclose(out, expected, atol=1e-9)
+            assert np.abs(expected).max() > 1e-4
+    for out in fit.outputs_in_turns(turns, state, []):
+        np.testing.assert_allclose(out, 0.0, atol=1e-12)
+
+
+def test_turns_are_followed_to_another_state_without_the_way() -> None:
+    one = ride("gyro_scale")
+    fit = one.fit.independent_copy(one.turns)
+    assert fit.turn_rows == one.turns and fit.turns_at(fit.nominal) == []
+    fit.follow_turns(fit.nominal, one.values)
+    assert fit.turn_rows == one.turns, "it has no recording of turns"
+    assert list(fit.outputs_in_turns([], fit.nominal, [])) == []
+    fit = one.fit
+    term = Term(one.group.effect, one.true)  # type: ignore[arg-type]
+    state = replace(fit.nominal, terms=(*fit.nominal.terms, term))
+    fit.follow_turns(state, one.values)
+    largest = 0.0
+    for turn, before in zip(fit.turn_rows, one.turns, strict=True):
+        assert not len(turn.way) and turn.positions == before.positions
+        predicted = turn.design @ one.values[turn.columns]
+        size = np.linalg.norm(turn.closure)
+        assert np.linalg.norm(turn.closure - predicted) < 1e-4 * size + 1e-6
+        largest = max(largest, float(size))
+    assert largest > 1e-3
+
+
+def test_the_unit_of_outputs_changes_neither_turns_nor_evidence() -> None:
+    """Not even where gyroscopes have another one than accelerometers."""
+    unit = np.repeat([2.0, 8.0], 3)
+    ridden = recorded(checked_effect("gyro_scale", ERRORS["gyro_scale"]))
+    (fit, known, turns), (other, again, found) = (
+        followed(*ridden, scale) for scale in (None, unit)
+    )
+    assert again.score == pytest.approx(known.score, rel=1e-9)
+    for turn, before in zip(found, turns, strict=True):
+        np.testing.assert_allclose(turn.info, before.info, rtol=1e-6)
+        np.testing.assert_allclose(turn.closure, before.closure, atol=1e-9)
+        np.testing.assert_allclose(turn.way, before.way, atol=1e-3)
+    keys = {c.key for c in fit.dictionary.causes}
+    assert {c.key for c in other.dictionary.causes} == keys
+    causes = {c.key: c for c in other.dictionary.causes}
+    for cause in fit.dictionary.causes:
+        if cause.name.startswith("gyro_"):
+            group, scaled = cause.variants[0], causes[cause.key].variants[0]
+            np.testing.assert_allclose(scaled.typical, 8.0 * group.typical)
+
+
 def test_information_of_closures_is_that_of_noise() -> None:
     """Of white noise over the turn, and of nothing that is not there."""
     for turn in ride("gyro_scale").turns:
@@ -332,6 +407,24 @@ def test_the_time_since_a_turn_counts_from_where_it_ends() -> None:
     )
     np.testing.assert_allclose(since[0], [np.inf, 0.0, 2.0], atol=1e-9)
     assert abs(ended[0] - (2 * SPACING_S)) < 0.7
+
+
+def test_on_the_way_the_clock_of_the_session_goes_on() -> None:
+    fit = ride("gyro_scale").fit
+    assert fit.turns is not None
+    tracker = fit.turns.tracker
+    source = replace(tracker.source)
+    later = replace(source, block=replace(source.block, t=source.block.t + 500.0))
+    tracker = copy(tracker)
+    tracker.source = later
+    for turn in tracker.turns(fit.nominal):
+        np.testing.assert_allclose(
+            turn.x.since_start, turn.t - 500.0 - source.block.t[0]
+        )
+        middle = (turn.t[0] + turn.t[-1]) / 2 - 500.0
+        assert abs((middle - 1.0) % SPACING_S - 9.0) < 1.5, "between two windows"
+        assert np.isinf(turn.x.since_turn).all()
+        assert (turn.x.position == -1).all()
 
 
 def test_a_gyroscope_that_is_off_on_the_way_bends_a_turn_as_its_bias_does() -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 from fieldcal.importing.words.heading_units import (
@@ -62,6 +63,9 @@ _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated
             "rate", *AXIS)  # fmt: skip
 """Words that tell no IMU from another where all of one kind have them."""
 
+NAMES = 4096
+"""Names whose meaning is remembered: a program prints the same ones in each line."""
+
 LONGEST = 300
 """Characters of a name; what is longer is a line without columns."""
 
@@ -102,6 +106,7 @@ class HeadingMeaning(NamedTuple):
     half: bool = False
 
 
+@lru_cache(NAMES)
 def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
     """Return the meaning of a name; None if it names no channel.
 

@@ -26,7 +26,6 @@ that everything behind it knows columns of numbers alone.
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Collection, Sequence
 
@@ -57,6 +56,7 @@ from fieldcal.importing.text.text_form import (
     is_true_of_most,
     take_row,
 )
+from fieldcal.importing.text.text_lines import split_quoted
 from fieldcal.importing.text.text_top import find_separator, split_cells
 from fieldcal.importing.text.vectornav_lines import VectorNavLines
 from fieldcal.importing.text.written_numbers import FortranNumbers, UnitCells
@@ -118,12 +118,9 @@ class QuotedCells(TextForm):
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
-
-        def read(lines: Sequence[str]) -> list[str]:
-            rows = csv.reader(lines, delimiter=self._old, skipinitialspace=True)
-            return [self._new.join(row) for row in rows]
-
-        return read
+        return lambda lines: [
+            self._new.join(split_quoted(line, self._old)) for line in lines
+        ]
 
 
 class LabelledValues(TextForm):

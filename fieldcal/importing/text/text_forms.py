@@ -1,6 +1,7 @@
 r"""Texts that are not plain columns, written as such: quotes, labels, times of a clock.
 
     "0,12","0,34"                      quoted, also with decimal commas
+    "1,714,746"  1 714 746  1'714'746  thousands that are set apart
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
     Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
@@ -32,6 +33,7 @@ from collections.abc import Collection, Sequence
 from fieldcal.importing.text.bare_fractions import BareFractions
 from fieldcal.importing.text.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.text.dataflash_text import DataflashText
+from fieldcal.importing.text.grouped_digits import GroupedDigits
 from fieldcal.importing.text.labels import (
     CLOCKS,
     TitledValues,
@@ -294,8 +296,8 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
-    CheckedLines, EchoedMessages, EndedLines, DatabasePoints, QuotedCells,
-    FortranNumbers, UnitCells,
+    CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
+    QuotedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, BarTable, ListCells,
     SplitDecimals, SensorCodes, TaggedLines, ArrivalPrefix, HexCells, BareFractions,
     ClockColumn,

@@ -76,3 +76,11 @@ def test_decimals_are_no_thousands(
 def test_three_numbers_in_a_cell_are_no_thousands() -> None:
     cells = ["490 504 539", "491 503 540", "-12 503 541", "490 3 542", "488 505 540"]
     assert GroupedDigits.of([f"{i};{c}" for i, c in enumerate(cells)], None) is None
+
+
+@given(st.lists(st.text(alphabet="0123456789 .,;'-x", max_size=12), max_size=9))
+def test_any_cells_are_grouped_digits_or_are_not(cells: list[str]) -> None:
+    """Numbers that stand behind spaces have no sign between thousands."""
+    lines = [f"0;{cell}" for cell in cells] + ["0; 12", "0; 13", "0; -14"]
+    form = GroupedDigits.of(lines, None)
+    assert form is None or len(form.reader()(lines)) == len(lines)

@@ -52,10 +52,13 @@ _ANGLES = {"rad": "rad/s", "deg": "deg/s"}
 _NO_RATE = ("angle", "roll", "pitch", "yaw", "heading", "euler", "theta", "phi")
 """Words of angles that are no rates."""
 
-COUNTERS = ("packet", "packets", "counter", "count", "cnt", "index", "idx", "number",
-            "nr", "no", "frame", "row", "line", "sample", "samples", "seq", "sequence",
-            "id", "n")  # fmt: skip
+COUNTERS = ("packet", "packets", "counter", "count", "cntr", "cnt", "index", "idx",
+            "number", "nr", "no", "frame", "row", "line", "sample", "samples", "seq",
+            "sequence", "id", "n")  # fmt: skip
 """Words of columns that count rows or messages."""
+
+COUNTED = ("data", "message", "messages", "msg", "record", "records")
+"""Words of what is counted, which stand beside them."""
 
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host", "t_h": "t_h",
           "t_min": "t_min"}  # fmt: skip
@@ -274,11 +277,11 @@ def words_in_name(name: str) -> list[str]:
 def is_counter(name: str) -> bool:
     """Whether a name is that of a counter, whose numbers are no times.
 
-    >>> is_counter("Packet number"), is_counter("sample_time"), is_counter("")
-    (True, False, False)
+    >>> [is_counter(one) for one in ("Packet number", "DATA_CNTR", "sample_time", "")]
+    [True, True, False, False]
     """
     words = words_in_name(name)
-    return bool(words) and {*words} <= {*COUNTERS}
+    return bool({*words} & {*COUNTERS}) and {*words} <= {*COUNTERS, *COUNTED}
 
 
 def _find_phrase(words: Sequence[str], phrase: Sequence[str]) -> int | None:

@@ -15,7 +15,7 @@ SENSORS = {
         " przyspieszenie ускорение 加速度 가속도"
     ).split(),
     "g": (
-        "g w gyr gyro gyroscope gyros omega rate gy gyroskop giroscopio giroskop"
+        "g w pqr gyr gyro gyroscope gyros omega rate gy gyroskop giroscopio giroskop"
         " drehrate winkelgeschwindigkeit гироскоп 角速度 陀螺仪 ジャイロ 각속도 자이로"
     ).split(),
     "m": "m mag magnetometer magnetic compass 磁场 地磁気 磁気".split(),

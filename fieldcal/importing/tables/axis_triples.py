@@ -13,7 +13,11 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.units.scales import MIN_ROWS
-from fieldcal.importing.words.heading_words import heading_meaning, is_counter
+from fieldcal.importing.words.heading_words import (
+    heading_meaning,
+    is_counter,
+    words_in_name,
+)
 from fieldcal.importing.words.sensor_words import AXES
 
 GROWS = 0.999
@@ -36,6 +40,7 @@ class FreeColumns(NamedTuple):
     channels : that are known, with the time
     clock : (n,) of the rows, which counts them where no column is a time
     forces, rates : sets of three columns that may be the axes of either
+    named : those that are known
 
     """
 
@@ -43,6 +48,7 @@ class FreeColumns(NamedTuple):
     clock: Array
     forces: Sequence[Three]
     rates: Sequence[Three]
+    named: Sequence[Three]
 
 
 def free_columns(
@@ -65,8 +71,9 @@ def free_columns(
     attitude = _quaternions(table)
     moving = [i for i in free if _moves(table[:, i]) and i not in attitude]
     threes = _axis_triples(moving, names)
+    named = [three for three in (acc, gyr) if three]
     return FreeColumns(
-        channels, clock, [acc] if acc else threes, [gyr] if gyr else threes
+        channels, clock, [acc] if acc else threes, [gyr] if gyr else threes, named
     )
 
 
@@ -153,9 +160,19 @@ def _axis_triples(free: Sequence[int], names: Sequence[str]) -> list[Three]:
     if whole and len({names[i] for i in free}) == len(free):
         return whole
     beside = zip(free, free[1:], free[2:], strict=False)
-    side = [(a, b, c) for a, b, c in beside if c == a + 2]
+    side = [_by_letters((a, b, c), names) for a, b, c in beside if c == a + 2]
     parted = len(free) % len(AXES) == 0 and len(side) == len(free) - len(AXES) + 1
     return side[:: len(AXES)] if parted else side
+
+
+def _by_letters(three: Three, names: Sequence[str]) -> Three:
+    """Columns side by side in the order of the axes that their names end with."""
+    ends = [words_in_name(names[i])[-1:] for i in three]
+    letters = {end[0]: i for i, end in zip(three, ends, strict=True) if end}
+    if {*letters} != {*AXES}:
+        return three
+    x, y, z = (letters[axis] for axis in AXES)
+    return x, y, z
 
 
 def _by_name(free: Sequence[int], names: Sequence[str]) -> list[Three]:

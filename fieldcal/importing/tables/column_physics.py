@@ -78,9 +78,11 @@ def identify_columns(
     free = free_columns(table, names, known)
     channels = dict(free.channels)
     found = _force_and_rate_triples(table, free.clock, free.forces, free.rates)
-    if found is None:
+    alone = free.named and {*free.forces, *free.rates} == {*free.named}
+    if found is None and not alone:
         return None
-    (acc, gyr), why = found
+    # of one sensor that is named, with nothing beside it, the time may be told
+    (acc, gyr), why = found or ((None, None), "")
     for kind, three in (("a", acc), ("g", gyr)):
         if three is not None:
             channels |= channels_of(kind, three)

@@ -158,15 +158,20 @@ class LabelledValues(TextForm):
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
         row: dict[str, str] = {}
-        titled = TitledValues()
+        titled, begun = TitledValues(), False
 
         def read(lines: Sequence[str]) -> list[str]:
+            nonlocal begun
             found = []
             for line in lines:
                 titles = titled.titles
                 said = titled.of(line)
                 bare = not said and titles == titled.titles
                 values = {k: v for k, v in said if k in self.names}
+                begun = begun or bool(values)
+                if said and not begun:
+                    # what stands above the rows may say their rate
+                    found.append(line)
                 if bare and line_shape(line) not in self._others:
                     # no row: whoever reads rows says so
                     found.append(line)

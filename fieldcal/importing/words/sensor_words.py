@@ -10,7 +10,7 @@ AXIS = ("axis", "achse", "axe", "eje", "asse", "eixo", "os", "ось")
 
 SENSORS = {
     "a": (
-        "a f acc accel accelerometer acceleration accs accl acce ac"
+        "a f acc accel accelero accelerometer acceleration accs accl acce ac"
         " beschleunigung aceleracion aceleracao accelerazione versnelling"
         " przyspieszenie ускорение 加速度 가속도"
     ).split(),
@@ -29,6 +29,7 @@ PHRASES = (
     (("angular", "vel"), "g"),
     (("ang", "vel"), "g"),
     (("rotation", "rate"), "g"),
+    (("angle", "rate"), "g"),
     (("gyro", "rotation"), "g"),
     (("velocidad", "angular"), "g"),
     (("velocidade", "angular"), "g"),

@@ -27,6 +27,7 @@ from fieldcal.importing.tables.column_times import (
     is_clock_number,
     is_row_counter,
     rate_hint,
+    share_of_one_time,
     split_seconds,
     turns_in_order,
 )
@@ -203,6 +204,12 @@ class ColumnClock:
             raise InputError(
                 f"{self._of.path}: column t is {value:.10g} in all rows, so it is no"
                 " time: name it _ in --columns, and give --rate"
+            )
+        if (share := share_of_one_time(t)) and not any(n in at for n in FRACTIONS):
+            raise InputError(
+                f"{self._of.path}: {100 * share:.0f} % of its rows have the time of the"
+                " row before, as where it was written with too few digits, so it does"
+                " not say when they were taken: name it _ in --columns, and give --rate"
             )
         if not any(name in at for name in FRACTIONS):
             if (spread := self._spread(wanted, t)) is not None:

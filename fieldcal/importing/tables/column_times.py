@@ -17,9 +17,11 @@ from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.scales import MIN_ROWS, counts_beside, rounded_text
 from fieldcal.importing.units.time_units import (
+    SHARED,
     UNIX,
     SharedTimes,
     possible_time_units,
+    shared_times,
     time_units_of_bursts,
 )
 
@@ -224,6 +226,22 @@ def constant_value(t: Array) -> float | None:
     """The only value of numbers (n,), which are no times then; None of others."""
     known = t[np.isfinite(t)]
     return float(known[0]) if len(known) > 1 and not np.ptp(known) else None
+
+
+def share_of_one_time(t: Array) -> float:
+    """Share of rows (n,) that have the time of the row before; 0 where few have.
+
+    Those of batches, whose times step again and again, are no such rows. Numbers of 32
+    bits hold the seconds since 1970 in steps of 128 s.
+
+    >>> share_of_one_time(np.repeat([0.0, 128.0], 51)) > 0.9
+    True
+    >>> share_of_one_time(np.arange(99.0)), share_of_one_time(np.repeat(range(9), 9))
+    (0.0, 0.0)
+    """
+    steps = np.diff(t[np.isfinite(t)])
+    same = float((steps == 0).mean()) if len(steps) >= MIN_ROWS else 0.0
+    return same if same > SHARED and shared_times(t) is None else 0.0
 
 
 def keeps_growing(t: Array) -> bool:

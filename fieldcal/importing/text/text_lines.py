@@ -7,8 +7,15 @@ import csv
 from fieldcal.core.samples import Array
 from fieldcal.session.arrow_columns import float_values
 
-MISSING = ("", "null", "NULL", "None", "NA", "N/A", "n/a", "#N/A", "NaN", "nan", "-")
-"""What stands in a cell that holds no value."""
+MISSING = ("", "null", "NULL", "None", "NA", "N/A", "n/a", "#N/A", "NaN", "nan", "-",
+           "--", "---", "?", "1.#QNAN", "-1.#QNAN", "1.#QNAN0", "-1.#QNAN0", "1.#IND",
+           "-1.#IND", "1.#IND00", "-1.#IND00")  # fmt: skip
+"""What stands in a cell that holds no value; the last as older C libraries of Microsoft
+write one that cannot be calculated."""
+
+COMMENTS = ("# ", "% ", "// ")
+"""What lines that are no rows begin with, in many programs; without the space behind
+it, a message of a receiver may."""
 
 MINUS = "\u2212"
 """The sign that spreadsheets write before negative numbers in some languages."""

@@ -4,6 +4,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     "1,714,746"  1 714 746  1'714'746  thousands that are set apart
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
     Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
+    AcX,12,AcY,-45,AcZ,16384           values behind cells with their names
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
     $IMU,0.01,0.1*5A                   lines with a checksum
     %RAWIMUSA,2209,4916.2;...*1fb76c28  messages of a receiver
@@ -45,6 +46,7 @@ from fieldcal.importing.text.labview_text import LabviewText
 from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
 from fieldcal.importing.text.nested_values import NestedValues
+from fieldcal.importing.text.paired_cells import PairedCells
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.importing.text.scaled_counts import ScaledCounts
@@ -302,7 +304,7 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
-    QuotedCells, FortranNumbers, UnitCells,
+    QuotedCells, PairedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, BarTable, ListCells,
     SplitDecimals, SensorCodes, TaggedLines, ArrivalPrefix, HexCells, BareFractions,
     ClockColumn,

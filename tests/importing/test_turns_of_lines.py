@@ -36,6 +36,7 @@ def read(folder: Path, text: str, rate: float | None = 50.0) -> tuple[Block, lis
         ("{:8.5f}   {:8.5f}   {:8.5f}    G", "{:.4f}   {:.4f}   {:.4f}    o/s"),
         ("{:.5f}\t{:.5f}\t{:.5f}\tg", "{:.4f}\t{:.4f}\t{:.4f}\t°/s"),
         ("ACC,{:.5f},{:.5f},{:.5f}", "GYR,{:.4f},{:.4f},{:.4f}"),
+        ("A {:.5f} {:.5f} {:.5f}", "G {:.4f} {:.4f} {:.4f}"),
     ],
 )
 @pytest.mark.parametrize("swapped", [False, True])
@@ -89,6 +90,14 @@ def test_messages_of_other_kinds_stand_between(tmp_path: Path, timed: bool) -> N
     np.testing.assert_allclose(block.acc, np.round(A / G * 1000) * 1e-3 * G, atol=1e-6)
     np.testing.assert_allclose(block.gyr, W, atol=1e-6)
     assert any("those that name" in one for one in recording.says)
+
+
+def test_a_lone_g_is_no_unit_without_one_of_rates(tmp_path: Path) -> None:
+    """Lines of gyroscopes, of which none of accelerometers are told, are no forces."""
+    lines = ["G,{},{},{},{}\nX,{},1,2,3\n".format(*[t, *w], t)
+             for t, w in zip(T, W, strict=True)]  # fmt: skip
+    with pytest.raises(InputError, match="say what its columns are"):
+        read(tmp_path, "".join(lines), None)
 
 
 def test_sentences_of_a_receiver_name_no_values() -> None:

@@ -126,7 +126,7 @@ def tells_devices(name: str) -> bool:
 def _are_sensors(column: Sequence[str]) -> bool:
     """Whether cells name the two sensors of one IMU."""
     words = {*column}
-    return all(any(is_of_sensor(w, kind) for w in words) for kind in ("a", "g"))
+    return all(any(is_of_sensor(w, kind, words) for w in words) for kind in "ag")
 
 
 def _moves(cells: Sequence[str]) -> bool:

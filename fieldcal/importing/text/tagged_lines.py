@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple, Self
 
@@ -157,9 +157,21 @@ class TaggedLines(TextForm):
         return [c for i, c in enumerate(row) if i not in (self._place, self._time)]
 
 
-def is_of_sensor(word: str, sensor: str) -> bool:
-    """Whether a word names a sensor, of `SENSORS`, or is a unit of its values."""
-    return bool(SENSORS[sensor].search(word)) or sensor_of_unit(word) == sensor
+def is_of_sensor(word: str, sensor: str, among: Collection[str]) -> bool:
+    """Whether a word among others names a sensor, of `SENSORS`.
+
+    It may be a unit of its values, or its first letter. A lone g is either: beside a
+    unit of rates it is one of forces, and beside an a it stands for the gyroscopes.
+
+    >>> is_of_sensor("G", "a", ["G", "o/s"]), is_of_sensor("G", "g", ["A", "G", "M"])
+    (True, True)
+    """
+    if SENSORS[sensor].search(word):
+        return True
+    if any(sensor_of_unit(one) == "g" for one in among):
+        return sensor_of_unit(word) == sensor
+    letters = {one.lower().lstrip(SIGN) for one in among}
+    return {*"ag"} <= letters and word.lower().lstrip(SIGN) == sensor
 
 
 def _in_turn(
@@ -240,12 +252,13 @@ def _chosen(kinds: Sequence[LineKind]) -> tuple[LineKind | None, LineKind | None
     if len({kind.word for kind in kinds}) < len("ab"):
         return None, None
     plain = [kind for kind in kinds if not OTHER_QUANTITY.search(kind.word)]
-    of = {s: [k for k in plain if is_of_sensor(k.word, s)] for s in SENSORS}
+    words = {kind.word for kind in plain}
+    of = {s: [k for k in plain if is_of_sensor(k.word, s, words)] for s in SENSORS}
     if of["imu"] and not of["a"]:
         return of["imu"][0], None
     if of["a"]:
         first = of["a"][0]
-        gyr = [k for k in of["g"] if not is_of_sensor(k.word, "a")]
+        gyr = [k for k in of["g"] if not is_of_sensor(k.word, "a", words)]
         return first, (gyr[0] if gyr else None)
     # words of equal lines say what was done, or which device it was
     wide = [kind for kind in kinds if kind.width > len("txyz")]

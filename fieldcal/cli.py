@@ -60,7 +60,7 @@ def _top_parser(version: str) -> argparse.ArgumentParser:
     return parser
 
 
-def _command_parser(name: str, command: CommandModule) -> argparse.ArgumentParser:
+def _command_parser(name: str, command: CommandModule) -> CommandParser:
     parser = CommandParser(
         command.EXAMPLE,
         getattr(command, "RARE", ()),
@@ -111,7 +111,8 @@ def _run_guarded(name: str, arguments: list[str]) -> int:
 
     command, printed = _load(name), False
     try:
-        code = command.run(_command_parser(name, command).parse_args(arguments))
+        parser = _command_parser(name, command)
+        code = command.run(parser.parse_args(parser.with_lists(arguments)))
         return _flush_output(code)
     except FieldcalError as error:
         said, code, printed = (

@@ -61,6 +61,27 @@ class CommandParser(argparse.ArgumentParser):
                 help="also show the rarely used options",
             )
 
+    def with_lists(self, arguments: Sequence[str]) -> list[str]:
+        """Arguments whose lists may begin with a minus, as ``--columns -t,ax,ay,az``.
+
+        argparse takes such a list for an option, and the one before for one without
+        its value.
+
+        >>> parser = CommandParser("")
+        >>> _ = parser.add_argument("--zero")
+        >>> parser.with_lists(["--zero", "-1,2,3", "--zero", "-1"])
+        ['--zero=-1,2,3', '--zero', '-1']
+        """
+        found: list[str] = []
+        for argument in arguments:
+            option = self._option_string_actions.get(found[-1]) if found else None
+            listed = argument.startswith("-") and "," in argument
+            if listed and option is not None and option.nargs is None:
+                found[-1] += f"={argument}"
+            else:
+                found.append(argument)
+        return found
+
     def format_help(self) -> str:
         """Help without the rarely used options."""
         positional = [a.metavar or a.dest for a in self._actions if _is_positional(a)]

@@ -113,10 +113,7 @@ def _format_names() -> str:
 
 
 def _add_device_options(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group(
-        "device", "A list that begins with a minus is written as in --acc-bias=-0.3,0,0"
-    )
-    add = group.add_argument
+    add = parser.add_argument_group("device").add_argument
     add("--profile", type=Path, metavar="FILE", help="device file to start from")
     add(
         "--with",

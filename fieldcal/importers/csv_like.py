@@ -28,6 +28,7 @@ from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.tables.text_heading import TextHeading
 from fieldcal.importing.text.instances import ImuInstances, find_instances
 from fieldcal.importing.text.number_table import NumberTable
+from fieldcal.importing.text.receiver_lines import corrected_messages
 from fieldcal.importing.text.text_form import TextForm
 from fieldcal.importing.text.text_forms import forms_of
 from fieldcal.importing.text.text_lines import (
@@ -178,6 +179,12 @@ class TextColumns(ColumnRecording):
     def ask(self) -> str:
         """Say how its columns are named."""
         lines = self._top or [""]
+        if message := corrected_messages(lines):
+            return (
+                f"{self.path}: what its messages {message} hold is corrected by the"
+                " receiver: gravity and the errors of the sensors that it estimated are"
+                " taken out, so nothing can be calibrated by them; log RAWIMUSXA"
+            )
         if not self._numbers.size:
             return (
                 f"{self.path}: no line of it is a row of numbers, and none has values"

@@ -24,6 +24,10 @@ from fieldcal.importers.arrays import ArrayFile
 from fieldcal.importing.arrays.array_groups import arrays_in_group
 from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
 from fieldcal.importing.files.text_encoding import as_utf8
+from fieldcal.importing.records.cut_json import (
+    whole_beginning,
+    without_last_commas,
+)
 from fieldcal.importing.records.json_lists import json_lists
 from fieldcal.importing.text.text_form import MOSTLY
 from fieldcal.importing.times.clock_text import is_clock
@@ -98,10 +102,19 @@ class JsonLog(ArrayFile):
             If it is not whole.
 
         """
-        try:
-            return json.loads(text)
-        except (ValueError, RecursionError):
-            pass
+        for one in (str, without_last_commas):
+            try:
+                return json.loads(one(text))
+            except (ValueError, RecursionError):
+                pass
+        if (whole := whole_beginning(text)) is not None:
+            try:
+                document = _parse_text(whole)
+            except (ValueError, RecursionError):
+                document = None
+            if document is not None:
+                self.damaged("its end", "is cut off behind its last whole record")
+                return document
         found = []
         for number, line in enumerate(text.splitlines(), 1):
             if not line.strip():

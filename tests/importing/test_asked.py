@@ -65,6 +65,8 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
          "makes 0.05 Hz, and in ms it is 50 Hz: add --time-unit ms or --time-unit s"),
         (lines(1e-13 * np.arange(len(T)), A, W, head=f"t (s),{SIX}"),
          "column t: its samples come 1e+13 times a second"),
+        (lines(T, A, W, head=f"time (ms),{SIX}"),
+         "makes 5e+04 Hz, and in s it is 50 Hz: add --time-unit s or --time-unit ms"),
         (lines(np.round(np.arange(len(T)) * 1.5) + 115, DEG, A / G,
                head="Packet number,Gyroscope X (deg/s),Gyroscope Y (deg/s),"
                "Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),"
@@ -78,7 +80,8 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
          "a time that a spreadsheet shortened", "a time that stays, without a name",
          "seconds or rows", "too slow in any unit", "too fast in any unit",
          "too slow as it says",
-         "ms that are called s", "too fast as it says", "messages that are counted",
+         "ms that are called s", "too fast as it says", "s that are called ms",
+         "messages that are counted",
          "rows of pieces that are counted"],
 )  # fmt: skip
 def test_what_would_be_wrong_in_silence_is_asked(

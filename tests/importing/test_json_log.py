@@ -13,6 +13,10 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.records.cut_json import (
+    whole_beginning,
+    without_last_commas,
+)
 from fieldcal.importing.records.json_lists import json_lists
 from fieldcal.importing.records.pandas_json import records_of_frame
 
@@ -244,3 +248,50 @@ def test_a_data_frame_is_samples(tmp_path: Path, name: str) -> None:
 def test_any_document_is_a_data_frame_or_none(document: Any) -> None:
     frame = records_of_frame(document)
     assert frame is None or all(isinstance(one, dict) for one in frame)
+
+
+@pytest.mark.parametrize("indent", [None, 1])
+@pytest.mark.parametrize("within", [False, True])
+def test_a_document_that_was_cut_off_is_read_up_to_its_last_whole_record(
+    tmp_path: Path, indent: int | None, within: bool
+) -> None:
+    records = [nested(i) for i in range(ROWS)]
+    document = {"device": {"id": 1, "axes": [1, 2]}, "data": records}
+    text = json.dumps(document if within else records, indent=indent)
+    path = tmp_path / "log.json"
+    path.write_text(text[: text.rindex('"gyro"')])
+    with pytest.raises(InputError, match="its end: is cut off .* --repair"):
+        open_recording(path, ReadOptions()).streams()
+    recording = open_recording(path, ReadOptions(), repair=True)
+    (stream,) = recording.streams()
+    block = concat(recording.blocks(stream.name))
+    np.testing.assert_allclose(block.acc, ACC[:-1])
+    np.testing.assert_allclose(block.gyr, GYR[:-1])
+
+
+def test_lists_side_by_side_that_were_cut_off_are_not_of_one_length(
+    tmp_path: Path,
+) -> None:
+    document = {"t": T.tolist(), "acc": ACC.tolist(), "gyro": GYR.tolist()}
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps(document)[:-100])
+    recording = open_recording(path, ReadOptions(), repair=True)
+    with pytest.raises(InputError, match="different lengths"):
+        for stream in recording.streams():
+            concat(recording.alone(stream.name).blocks(stream.name))
+
+
+def test_a_comma_behind_the_last_record_is_none_too_many(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    records = ",\n".join(json.dumps(nested(i)) for i in range(ROWS))
+    path.write_text(f"[{records},\n]\n")
+    recording = open_recording(path, ReadOptions())
+    (stream,) = recording.streams()
+    np.testing.assert_allclose(concat(recording.blocks(stream.name)).acc, ACC)
+
+
+@given(st.text(alphabet='[]{},:"\\\\1 at', max_size=60))
+def test_any_text_is_nearly_a_document_or_is_none(text: str) -> None:
+    whole = whole_beginning(text)
+    assert whole is None or len(whole) >= 2
+    assert without_last_commas(text).replace(",", "") == text.replace(",", "")

@@ -106,3 +106,15 @@ def test_any_line_is_read_or_left(line: str, near: str) -> None:
 def test_examples() -> None:
     failed, tried = doctest.testmod(receiver_lines)
     assert tried and not failed
+
+
+def test_what_a_receiver_corrected_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(4, RATE, hold=1.0)
+    path = tmp_path / "log.asc"
+    path.write_text("\n".join(message("CORRIMUDATASA", r[0], r[1:4], r[4:])
+                              for r in rows))  # fmt: skip
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "CORRIMUDATASA hold is corrected" in said and "log RAWIMUSXA" in said

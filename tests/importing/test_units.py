@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from joined import read_files
 from laid_about import turned, write
 
 from fieldcal.cli import main
@@ -245,6 +246,18 @@ def test_clipped_rates_tell_their_unit_by_what_is_not(
     path, out = write(tmp_path, log), tmp_path / "out"
     assert main(["import", str(path), "--columns", COLUMNS, "-o", str(out)]) == 0
     np.testing.assert_allclose(Session.open(out).block.gyr, rows[:, 4:], atol=1e-6)
+
+
+@pytest.mark.parametrize("per_rad", [1.0, 180 / np.pi])
+@pytest.mark.parametrize("rate", [50.0, 200.0])
+def test_angles_gained_beside_forces_are_told_by_the_turns(
+    tmp_path: Path, per_rad: float, rate: float
+) -> None:
+    """As a fibre-optic device writes them: force in g, rad since the row before."""
+    rows = turned(9, rate)
+    log = np.column_stack([rows[:, 0], rows[:, 1:4] / G, rows[:, 4:] * per_rad / rate])
+    block, _ = read_files([write(tmp_path, log)])
+    np.testing.assert_allclose(block.six, rows[:, 1:], atol=1e-6)
 
 
 @pytest.mark.parametrize("lsb", [256.0, 2048.0])

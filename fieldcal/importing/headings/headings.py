@@ -19,6 +19,7 @@ from fieldcal.importing.words.heading_units import HALF_ANGLE, UNITS
 from fieldcal.importing.words.heading_words import (
     MEAN,
     SCATTER,
+    HeadingMeaning,
     bare_axis,
     bare_label,
     heading_meaning,
@@ -29,9 +30,14 @@ from fieldcal.importing.words.telephone_names import sign_of_ios
 from fieldcal.importing.words.thermometer_words import BESIDE_THERMOMETERS, FOREIGN
 
 NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
-               "magnitude", "norm", "drift", "delta",
-               "covariance", "valid", "validity", "flag", "status")  # fmt: skip
-"""Words of columns that are no samples of a sensor."""
+               "magnitude", "norm", "drift", "delta", "angle", "angles",
+               "covariance", "valid", "validity", "flag", "status", "command",
+               "commanded", "cmd", "desired", "des", "setpoint", "sp", "target",
+               "error", "err", "residual", "innovation", "filt")  # fmt: skip
+"""Words of columns that are no samples of a sensor: what is made of them, or wanted."""
+
+ANGULAR = ("angular", "ang", "rotational")
+"""Words of accelerations that are none of an accelerometer."""
 
 ROS = (("angular", "velocity"), ("linear", "acceleration"), ("ang", "vel"),
        ("lin", "acc"))  # fmt: skip
@@ -68,7 +74,7 @@ def match_headings(
         for i, column in enumerate(columns)
         if "," not in column.place
         and (said := heading_meaning(column.name, column.unit)) is not None
-        and (said.kind == "t" or not _is_no_sample(said.label))
+        and (said.kind == "t" or not _is_no_sample(said))
     ]
     named = best_columns(columns, named)
     acc, gyr = _triads(named, "a"), _triads(named, "g")
@@ -215,11 +221,12 @@ def _nearest_before(
     return max(alike, key=lambda n: n.number, default=clock)
 
 
-def _is_no_sample(label: Sequence[str]) -> bool:
+def _is_no_sample(said: HeadingMeaning) -> bool:
     """Whether the words of a column say that it holds no samples of a sensor."""
     # one of low noise is a sensor
-    quiet = {"noise"} if "low" in label else set()
-    return bool(({*label} - quiet) & {*NOT_SAMPLES})
+    quiet = {"noise"} if "low" in said.label else set()
+    others = (*NOT_SAMPLES, *(ANGULAR if said.kind == "a" else ()))
+    return bool(({*said.label} - quiet) & {*others})
 
 
 def _columns_of_imu(

@@ -1,4 +1,7 @@
-"""Axes that are numbered: ``accel_0 accel_1 accel_2``, ``dv[1] dv[2] dv[3]``."""
+"""Axes that are numbered: ``accel_0 accel_1 accel_2``, ``dv[1] dv[2] dv[3]``.
+
+Or listed in the first of three names: ``accel (z,x,y)``, ``1``, ``2``.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections.abc import Sequence
 
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.words.heading_words import heading_meaning
+from fieldcal.importing.words.listed_axes import names_of_listed_axes
 from fieldcal.importing.words.sensor_words import AXES
 
 _NUMBERED = re.compile(r"(.*\D)[\[(]?([0-3])[\])]?(\s*[\[(][^\d\[\]()]+[\])])?")
@@ -26,7 +30,7 @@ def with_lettered_axes(columns: Sequence[Column]) -> list[Column]:
     >>> [column.name for column in with_lettered_axes(three)]
     ['Accel_x [g]', 'Accel_y [g]', 'Accel_z [g]']
     """
-    found = _with_lettered_turns(columns)
+    found = _with_listed_axes(_with_lettered_turns(columns))
     numbered = [_NUMBERED.fullmatch(column.name.strip()) for column in found]
     for i in range(len(columns) - 2):
         three = numbered[i : i + 3]
@@ -42,6 +46,26 @@ def with_lettered_axes(columns: Sequence[Column]) -> list[Column]:
         for k, axis in enumerate(AXES):
             name = f"{stem}_{axis}{said[k][1] or ''}"
             found[i + k] = found[i + k]._replace(name=name)
+    return found
+
+
+def _with_listed_axes(columns: Sequence[Column]) -> list[Column]:
+    """Columns of which three stand below one name that lists their axes.
+
+    The names of the other two are numbers, or nothing.
+
+    >>> three = [Column("", name) for name in ("Gyro (z,x,y) [rad/s]", "1", "2")]
+    >>> [column.name for column in _with_listed_axes(three)]
+    ['Gyro z [rad/s]', 'Gyro x [rad/s]', 'Gyro y [rad/s]']
+    """
+    found = [*columns]
+    for i, column in enumerate(columns):
+        names = names_of_listed_axes(column.name)
+        others = [one.name.strip() for one in columns[i + 1 : i + len(AXES)]]
+        bare = all(not one or one.isdecimal() for one in others)
+        if names and bare and len(others) == len(AXES) - 1:
+            for k, name in enumerate(names):
+                found[i + k] = columns[i + k]._replace(name=name)
     return found
 
 

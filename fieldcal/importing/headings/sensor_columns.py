@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from fieldcal.importing.headings.heading import Column, Heading
-from fieldcal.importing.words.heading_words import heading_meaning
+from fieldcal.importing.words.heading_words import heading_meaning, words_in_name
 from fieldcal.importing.words.sensor_words import AXES
+
+OF_ANY = ("attr", "value", "values", "val", "data", "raw", "sensor")
+"""Words beside an axis that say no sensor: ``attr_x``."""
 
 
 def of_sensor(sensor: str, column: Column) -> Column:
     """Column of which a bare axis, whose unit does not say it, is the sensor's."""
     bare = column.name.strip().strip('"').strip()
     axis = bare[:1].lower() in AXES and not bare[1:2].isalpha()
+    if len(letter := [w for w in words_in_name(bare) if w not in OF_ANY]) == 1:
+        axis |= letter[0] in AXES
     said = heading_meaning(bare, column.unit)
     told = said is not None and bool(said.kind)
     if said is not None and said.kind == "v" and sensor == "acc":

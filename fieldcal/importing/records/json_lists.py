@@ -29,10 +29,15 @@ from fieldcal.importing.records.record_pairs import pair_records
 from fieldcal.importing.times.clock_text import ClockText
 from fieldcal.importing.times.fifo_time import GAP_BATCHES
 from fieldcal.importing.words.heading_words import heading_meaning
+from fieldcal.importing.words.listed_axes import listed_axes
+from fieldcal.importing.words.sensor_words import AXES
 
 
 def json_lists(
-    document: Any, name: str = "", says: list[str] | None = None
+    document: Any,
+    name: str = "",
+    says: list[str] | None = None,
+    order: Sequence[str] = AXES,
 ) -> Iterator[tuple[str, Array]]:
     """Lists (n,) or (n, k) of a document, with their names.
 
@@ -40,6 +45,7 @@ def json_lists(
     ----------
     document, name : and what it lies in
     says : grows by what the user must know, a sentence each
+    order : axes of three numbers in a list, which a text beside it may list
 
     >>> [(n, v.tolist()) for n, v in json_lists([{"t": 0, "a": {"x": 1}}, {"t": 1}])]
     [('t', [0.0, 1.0]), ('a_x', [1.0, nan])]
@@ -47,10 +53,12 @@ def json_lists(
     if (frame := records_of_frame(document)) is not None:
         document = frame
     if isinstance(document, Mapping):
+        texts = (one for one in document.values() if isinstance(one, str))
+        order = next(filter(None, map(listed_axes, texts)), order)
         for key, value in document.items():
             if name.count("/") < DEEPEST:
                 full = f"{name}/{key}" if name else key
-                yield from json_lists(value, full or "value", says)
+                yield from json_lists(value, full or "value", says, order)
     elif not isinstance(document, list) or len(document) <= 1:
         return
     elif all(is_number(one) for one in document):
@@ -62,7 +70,8 @@ def json_lists(
             if len(rows) == len(document) and len({*map(len, rows)}) == 1:
                 yield name or "list", np.array(rows)
     else:
-        records = [read_record(one) for one in document if isinstance(one, Mapping)]
+        records = [read_record(one, order=order)
+                   for one in document if isinstance(one, Mapping)]  # fmt: skip
         for bare, values in _fields(records, [] if says is None else says):
             yield (f"{name}/{bare}" if name else bare), values
 

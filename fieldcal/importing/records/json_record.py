@@ -79,13 +79,25 @@ def _number_in_text(name: str, text: str) -> float | None:
     return number if channel or "." in text else None
 
 
-def read_record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> JsonRecord:
-    """A record, with the names of what lies within it joined."""
+def read_record(
+    value: Mapping[str, Any],
+    name: str = "",
+    depth: int = 0,
+    order: Sequence[str] = AXES,
+) -> JsonRecord:
+    """A record, with the names of what lies within it joined.
+
+    Parameters
+    ----------
+    value, name, depth : the record, what it lies in, and how many records that are
+    order : axes of three numbers in a list
+
+    """
     found = JsonRecord({}, {}, {}, {})
     for key, inner in value.items():
         full = f"{name}_{key}".strip("_") or "value"
         if isinstance(inner, Mapping) and depth < DEEPEST:
-            within = read_record(inner, full, depth + 1)
+            within = read_record(inner, full, depth + 1, order)
             found.numbers.update(within.numbers)
             found.clocks.update(within.clocks)
             found.texts.update(within.texts)
@@ -102,7 +114,7 @@ def read_record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> Jso
         elif isinstance(inner, str):
             found.texts[full] = inner
         elif isinstance(inner, list) and all(is_number(one) for one in inner):
-            axes = AXES if len(inner) == len(AXES) else range(len(inner))
+            axes = order if len(inner) == len(AXES) else range(len(inner))
             pairs = zip(axes, inner, strict=True)
             found.numbers.update({f"{full}_{a}": _float(v) for a, v in pairs})
         elif isinstance(inner, list) and inner:

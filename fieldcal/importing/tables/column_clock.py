@@ -22,11 +22,14 @@ from fieldcal.importing.tables.column_times import (
     ask_rate_of_shared_times,
     batch_options,
     constant_value,
+    falls_each_row,
     grows_each_row,
     is_clock_number,
     is_row_counter,
     rate_hint,
+    share_of_one_time,
     split_seconds,
+    turns_in_order,
 )
 from fieldcal.importing.times.repeats import NO_VALUES, distinct_rows
 from fieldcal.importing.times.row_times import CLOCK_PARTS, FRACTIONS
@@ -183,6 +186,10 @@ class ColumnClock:
         i = at.get("t", -1)
         if not 0 <= i < table.shape[1]:
             return wanted
+        if wanted.reversed.isdisjoint("t") and self._counts_down(wanted, table, i):
+            wanted = replace(wanted, reversed=wanted.reversed | {"t"})
+        if "t" in wanted.reversed:
+            table = np.where(np.arange(table.shape[1]) == i, -table, table)
         # of rows that were written several times, each counts once
         no_values = (columns.SKIP, *NO_VALUES)
         wanted_too = (j for name, j in at.items() if name not in no_values)
@@ -198,6 +205,12 @@ class ColumnClock:
                 f"{self._of.path}: column t is {value:.10g} in all rows, so it is no"
                 " time: name it _ in --columns, and give --rate"
             )
+        if (share := share_of_one_time(t)) and not any(n in at for n in FRACTIONS):
+            raise InputError(
+                f"{self._of.path}: {100 * share:.0f} % of its rows have the time of the"
+                " row before, as where it was written with too few digits, so it does"
+                " not say when they were taken: name it _ in --columns, and give --rate"
+            )
         if not any(name in at for name in FRACTIONS):
             if (spread := self._spread(wanted, t)) is not None:
                 return replace(spread, written_again=not once.all())
@@ -210,6 +223,20 @@ class ColumnClock:
                 )
                 wanted = replace(wanted, tick=tick)
         return wanted if wanted.time_unit else self._told(wanted, table, i)
+
+    def _counts_down(self, wanted: ReadOptions, table: Array, i: int) -> bool:
+        """Whether times fall and rows stand in their order: say so.
+
+        As gravity turns from row to row, the rates tell in which order they were taken;
+        of rows that were written newest first, both would turn against each other.
+        """
+        if not (falls_each_row(table[:, i]) and turns_in_order(wanted, table)):
+            return False
+        self._of.says.append(
+            "its times fall from row to row, and gravity turns as the rates say if the"
+            " rows were taken in this order: its timer counts down"
+        )
+        return True
 
     def _spread(self, wanted: ReadOptions, t: Array) -> ReadOptions | None:
         """Options by which rows of one time (n,) are spread; None if none do.

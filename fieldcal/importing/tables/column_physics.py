@@ -8,8 +8,7 @@ that length.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import permutations
 from typing import NamedTuple
 
@@ -17,6 +16,11 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
+from fieldcal.importing.tables.axis_triples import (
+    Three,
+    channels_of,
+    free_columns,
+)
 from fieldcal.importing.units.gravity_size import (
     FEWEST_MEANS,
     GravityReading,
@@ -28,19 +32,10 @@ from fieldcal.importing.units.rate_size import estimate_rate_unit, turns_deny
 from fieldcal.importing.units.scales import (
     ACC_OUT,
     ACC_SCALES,
-    MIN_ROWS,
     fitting_scales,
     gain_scales,
 )
 from fieldcal.importing.units.time_units import usual_step
-from fieldcal.importing.words.heading_words import heading_meaning, is_counter
-from fieldcal.importing.words.sensor_words import AXES
-
-GROWS = 0.999
-"""Share of steps of a time that are positive: a line may be damaged."""
-
-RATES = ("p", "q", "r")
-"""What those who fly call rates about x, y and z."""
 
 NOISY = 0.1
 """Part of gravity that its own noise is not."""
@@ -48,13 +43,8 @@ NOISY = 0.1
 EXACT = 5e-5
 """Part by which a direction's length differs: a sensor has scatter and bias."""
 
-UNIT_LENGTH = 0.02
-"""Part by which the length of a quaternion of two decimals may differ from 1."""
-
 LEAST_COUNTS = 1000.0
 """Counts in a g by which an accelerometer is told without turns."""
-
-Three = tuple[int, int, int]
 
 
 class IdentifiedColumns(NamedTuple):
@@ -85,32 +75,17 @@ def identify_columns(
     """
     if len(table) < FEWEST_MEANS:
         return None
-    channels = dict(known)
-    times = [i for i in _growing(table) if i not in known]
-    if "t" not in channels.values():
-        clocks = [
-            i for i in times if not (_counts(table[:, i]) or is_counter(names[i]))
-        ]
-        if clocks:
-            # a thermometer may only grow as well, but the time stands first
-            channels[next((i for i in clocks if _says_time(names[i])), clocks[0])] = "t"
-    t = next((i for i, name in channels.items() if name == "t"), None)
-    clock: Array = np.arange(len(table), dtype=float) if t is None else table[:, t]
-    free = [i for i in range(table.shape[1]) if i not in {*known, *times}]
-    acc = _named(known, "a")
-    gyr = _named(known, "g")
-    attitude = _quaternions(table)
-    moving = [i for i in free if _moves(table[:, i]) and i not in attitude]
-    threes = _axis_triples(moving, names)
-    found = _force_and_rate_triples(
-        table, clock, [acc] if acc else threes, [gyr] if gyr else threes
-    )
-    if found is None:
+    free = free_columns(table, names, known)
+    channels = dict(free.channels)
+    found = _force_and_rate_triples(table, free.clock, free.forces, free.rates)
+    alone = free.named and {*free.forces, *free.rates} == {*free.named}
+    if found is None and not alone:
         return None
-    (acc, gyr), why = found
+    # of one sensor that is named, with nothing beside it, the time may be told
+    (acc, gyr), why = found or ((None, None), "")
     for kind, three in (("a", acc), ("g", gyr)):
         if three is not None:
-            channels |= {i: kind + axis for i, axis in zip(three, AXES, strict=True)}
+            channels |= channels_of(kind, three)
     new = {name for i, name in channels.items() if known.get(i) != name}
     if not new:
         return None
@@ -119,128 +94,34 @@ def identify_columns(
     )
 
 
-def unnamed_axes(
-    table: Array, names: Sequence[str], known: Collection[int]
-) -> list[Three]:
-    """Columns without known meaning that vary and may be three axes.
+def possible_columns(
+    table: Array, names: Sequence[str], known: Mapping[int, str]
+) -> list[dict[int, str]]:
+    """Channels by column, of each two sets of axes that turn as one says of the other.
 
-    An axis may rest within one step of its output, if its name says that it is one.
+    Parameters
+    ----------
+    table, names, known : as of `identify_columns`
+
     """
-    if len(table) < MIN_ROWS or table.shape[1] != len(names):
+    if len(table) < FEWEST_MEANS:
         return []
-    without = {*known, *_growing(table), *_quaternions(table)}
-    free = [i for i in range(table.shape[1]) if i not in without]
-    moving = [i for i in free if _moves(table[:, i])]
-    named = [three for three in _by_name(free, names) if {*three} & {*moving}]
-    return _axis_triples(moving, names) or named
-
-
-def _says_time(name: str) -> bool:
-    """Whether a column is called a time."""
-    said = heading_meaning(name)
-    return said is not None and said.kind == "t"
-
-
-def _growing(table: Array) -> list[int]:
-    """Columns that only grow."""
-    found = []
-    for i in range(table.shape[1]):
-        column = table[:, i]
-        steps = np.diff(column[np.isfinite(column)])
-        if len(steps) > len(table) / 2 and (steps > 0).mean() >= GROWS:
-            found.append(i)
-    return found
-
-
-def _counts(column: Array) -> bool:
-    """Whether a column counts rows."""
-    steps = np.diff(column[np.isfinite(column)])
-    return bool((steps == 1).mean() > GROWS)
-
-
-def _quaternions(table: Array) -> set[int]:
-    """Columns that are an attitude: of four side by side the length is always 1.
-
-    That of an accelerometer in g beside a calm gyroscope is that of three of them.
-    """
-    found: set[int] = set()
-    for i in range(table.shape[1] - 3):
-        four = table[:, i : i + 4]
-        four = four[np.isfinite(four).all(axis=1)]
-        threes = (four[:, :3], four[:, 1:])
-        if _has_unit_length(four) and not any(map(_has_unit_length, threes)):
-            found |= {*range(i, i + 4)}
-    return found
-
-
-def _has_unit_length(values: Array) -> bool:
-    off = np.abs(np.linalg.norm(values, axis=1) - 1)
-    return bool(len(off) and off.max() < UNIT_LENGTH)
-
-
-def _moves(column: Array) -> bool:
-    known = column[np.isfinite(column)]
-    return len(known) > len(column) / 2 and float(np.ptp(known)) > 0
-
-
-def _named(known: Mapping[int, str], kind: str) -> Three | None:
-    where = {name: i for i, name in known.items()}
-    if not all(kind + axis in where for axis in AXES):
-        return None
-    x, y, z = (where[kind + axis] for axis in AXES)
-    return x, y, z
-
-
-def _axis_triples(free: Sequence[int], names: Sequence[str]) -> list[Three]:
-    """Columns that may be three axes, by their names or their order."""
-    whole = _by_name(free, names)
-    if whole and len({names[i] for i in free}) == len(free):
-        return whole
-    beside = zip(free, free[1:], free[2:], strict=False)
-    side = [(a, b, c) for a, b, c in beside if c == a + 2]
-    parted = len(free) % len(AXES) == 0 and len(side) == len(free) - len(AXES) + 1
-    return side[:: len(AXES)] if parted else side
-
-
-def _by_name(free: Sequence[int], names: Sequence[str]) -> list[Three]:
-    """Columns that are three axes, by the words that their names share."""
-    found: list[Three] = []
-    for letters in (AXES, RATES):
-        stems: dict[str, dict[str, int]] = {}
-        form = re.compile(rf"(.*?)[_ .]?([{''.join(letters)}])(\W.*|)")
-        for i in free:
-            if matched := form.fullmatch(names[i].lower()):
-                stem = f"{matched.group(1)}|{matched.group(3)}"
-                stems.setdefault(stem, {})[matched.group(2)] = i
-        x, y, z = letters
-        found += [(s[x], s[y], s[z]) for s in stems.values() if len(s) == len(letters)]
-    return found
+    free = free_columns(table, names, known)
+    sizes = _usual_forces(table, free.clock, free.forces)
+    pairs = _turning_pairs(table, free.clock, sizes, free.rates)
+    return [
+        {**free.channels, **channels_of("a", force), **channels_of("g", rate)}
+        for force, rate in pairs
+    ]
 
 
 def _force_and_rate_triples(
     table: Array, clock: Array, forces: Sequence[Three], rates: Sequence[Three]
 ) -> tuple[tuple[Three, Three | None], str] | None:
     """Specific force and rate among sets of axes, and why."""
-    sizes = {three: _gravity(table, three) for three in forces}
-    usual = [three for three in forces if sizes[three] is not None]
-    if not usual and (step := usual_step(clock)):
-        # no force, but what velocity and angle gained since the row before
-        sizes = {three: _gravity(table, three, step) for three in forces}
-        usual = [three for three in forces if sizes[three] is not None]
-    # a sphere through rests in many directions is no accident
-    usual = [three for three in usual if _is_round(sizes[three])] or usual
-    turning = []
-    for force in usual:
-        gravity = sizes[force]
-        for rate in rates:
-            if set(force) & set(rate) or gravity is None:
-                continue
-            acc, gyr = table[:, list(force)], table[:, list(rate)]
-            if (
-                estimate_rate_unit(_scaled_to_10_ms_steps(clock), acc, gyr, gravity)
-                is not None
-            ):
-                turning.append((force, rate))
+    sizes = _usual_forces(table, clock, forces)
+    usual = [*sizes]
+    turning = _turning_pairs(table, clock, sizes, rates)
     if len(turning) == 1:
         return turning[0], "gravity turns in the first three as the other three say"
     if turning:
@@ -263,6 +144,37 @@ def _force_and_rate_triples(
                 return (usual[0], None), f"{why}, and no others turn as they do"
             return (usual[0], apart[0] if apart else None), why
     return None
+
+
+def _usual_forces(
+    table: Array, clock: Array, forces: Sequence[Three]
+) -> dict[Three, GravityReading]:
+    """Sets of axes whose length is that of gravity in a usual unit, and this."""
+    sizes = {three: _gravity(table, three) for three in forces}
+    if not any(sizes.values()) and (step := usual_step(clock)):
+        # no force, but what velocity and angle gained since the row before
+        sizes = {three: _gravity(table, three, step) for three in forces}
+    usual = {three: size for three, size in sizes.items() if size is not None}
+    # a sphere through rests in many directions is no accident
+    return {three: size for three, size in usual.items() if size.round} or usual
+
+
+def _turning_pairs(
+    table: Array,
+    clock: Array,
+    forces: Mapping[Three, GravityReading],
+    rates: Sequence[Three],
+) -> list[tuple[Three, Three]]:
+    """Forces and rates that gravity turns by."""
+    even = _scaled_to_10_ms_steps(clock)
+    return [
+        (force, rate)
+        for force, gravity in forces.items()
+        for rate in rates
+        if not set(force) & set(rate)
+        and estimate_rate_unit(even, table[:, list(force)], table[:, list(rate)],
+                               gravity) is not None
+    ]  # fmt: skip
 
 
 def _denied(
@@ -291,10 +203,6 @@ def is_direction(values: Array) -> bool:
     length = np.linalg.norm(whole, axis=1)
     moves = len(whole) and np.ptp(whole, axis=0).max() > NOISY * np.median(length)
     return bool(moves and np.ptp(length) < EXACT * np.median(length))
-
-
-def _is_round(gravity: GravityReading | None) -> bool:
-    return gravity is not None and gravity.round
 
 
 def _is_usual_gravity(gravity: GravityReading | None) -> bool:

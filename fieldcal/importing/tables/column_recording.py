@@ -32,6 +32,8 @@ from fieldcal.importing.recording import (
     Recording,
 )
 from fieldcal.importing.tables import column_physics
+from fieldcal.importing.tables.axis_triples import unnamed_axes
+from fieldcal.importing.tables.column_choices import ask_of_choices, columns_option
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, column_numbers
 from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
@@ -153,12 +155,15 @@ class ColumnRecording(Recording):
             told = self._told(named or beside, way or next((w for _, w in ways), None))
             if told is not None:
                 return {"0": told}
+        if not (thermometer or all(_is_complete([one]) for one in named)):
             self._say_unnamed(named, way)
         for said in checked if not named else ():
             # the question of their size comes before that of their columns
             named = named or headings.match_headings(*said, weak=True)
         if not named:
-            raise InputError(self.ask())
+            first = next(iter(headed), None)
+            question = ask_of_choices(table, first)
+            raise InputError(f"{self.path}: {question}" if question else self.ask())
         taken = {one.name: one.taken(self.wanted) for one in named}
         rate = self.rate_said()
         for one in named:
@@ -232,26 +237,32 @@ class ColumnRecording(Recording):
         """
         if not named or way is None:
             return
-        known = _known(named, way)
+        known: dict[int, str] = {}
+        for one in named:
+            known |= _known([one], way)
         others = {
             i for i, c in enumerate(way.columns) if heading_meaning(c.name, c.unit)
         }
         names = [c.name for c in way.columns]
-        threes = column_physics.unnamed_axes(self.beginning(), names, {*known, *others})
+        threes = unnamed_axes(self.beginning(), names, {*known, *others})
         if not threes:
             return
-        which = " ".join(names[i] or f"column {i + 1}" for i in threes[0])
+        which, *more = (" ".join(names[i] or f"column {i + 1}" for i in three)
+                        for three in threes)  # fmt: skip
         if "ax" in known.values():
-            self.says.append(f"{which}: nothing says what they are; they are left out")
+            all_of_them = ", ".join([which, *more])
+            self.says.append(
+                f"{all_of_them}: nothing says what they are; they are left out"
+            )
             return
         axes = zip(threes[0], ("ax", "ay", "az"), strict=True)
         places = [c.place for c in way.columns]
-        with_them = ",".join(_columns_option(known | dict(axes), places, way.skip))
+        with_them = columns_option(known | dict(axes), places, way.skip)
         raise InputError(
             f"{self.path}: the names of its columns say where the gyroscopes are, and"
             f" nothing tells whether {which} are the accelerometers: add --columns"
             f" {quote(with_them)} if they are, or --columns"
-            f" {quote(','.join(_columns_option(known, places, way.skip)))}"
+            f" {quote(columns_option(known, places, way.skip))}"
         )
 
 
@@ -279,15 +290,6 @@ def _columns_of(table: Array, places: Mapping[str, int]) -> Array:
         if channel in places:
             found[:, i] = table[:, places[channel]]
     return found
-
-
-def _columns_option(
-    channels: Mapping[int, str], places: Sequence[str], skip: str
-) -> list[str]:
-    """Columns as ``--columns`` names them."""
-    if skip:
-        return [channels.get(i, skip) for i in range(len(places))]
-    return [f"{channels[i]}={places[i]}" for i in sorted(channels)]
 
 
 def _match_quality(found: Sequence[HeadingMatch]) -> tuple[int, int]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
 from fieldcal.importing.times.row_times import CLOCK_PARTS, FRACTIONS, NEAR_STEPS
@@ -17,9 +17,11 @@ from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.scales import MIN_ROWS, counts_beside, rounded_text
 from fieldcal.importing.units.time_units import (
+    SHARED,
     UNIX,
     SharedTimes,
     possible_time_units,
+    shared_times,
     time_units_of_bursts,
 )
 
@@ -226,6 +228,22 @@ def constant_value(t: Array) -> float | None:
     return float(known[0]) if len(known) > 1 and not np.ptp(known) else None
 
 
+def share_of_one_time(t: Array) -> float:
+    """Share of rows (n,) that have the time of the row before; 0 where few have.
+
+    Those of batches, whose times step again and again, are no such rows. Numbers of 32
+    bits hold the seconds since 1970 in steps of 128 s.
+
+    >>> share_of_one_time(np.repeat([0.0, 128.0], 51)) > 0.9
+    True
+    >>> share_of_one_time(np.arange(99.0)), share_of_one_time(np.repeat(range(9), 9))
+    (0.0, 0.0)
+    """
+    steps = np.diff(t[np.isfinite(t)])
+    same = float((steps == 0).mean()) if len(steps) >= MIN_ROWS else 0.0
+    return same if same > SHARED and shared_times(t) is None else 0.0
+
+
 def keeps_growing(t: Array) -> bool:
     """Whether times (n,) increase, with few resets."""
     steps = np.diff(t[np.isfinite(t)])
@@ -239,27 +257,34 @@ def grows_each_row(column: Array) -> bool:
     return keeps_growing(column) and bool((steps > 0).mean() > 0.5)
 
 
+def falls_each_row(column: Array) -> bool:
+    """Whether numbers (n,) fall from row to row, as those of a timer that counts down.
+
+    >>> falls_each_row(60 - np.arange(100) / 50), falls_each_row(np.arange(100.0))
+    (True, False)
+    """
+    steps = np.diff(column[np.isfinite(column)])
+    return len(steps) >= MIN_ROWS and float((steps < 0).mean()) > LATER
+
+
+def turns_in_order(wanted: ReadOptions, table: Array) -> bool:
+    """Whether gravity turns as the rates say, if rows (n, k) were taken in order."""
+    return _turn_reading(wanted, table) is not None
+
+
 def rates_by_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
     """Rates, Hz, at which turns by gyroscopes agree with those by gravity, by unit."""
-    at = {c.partition("=")[0]: i for i, c in enumerate(wanted.columns)}
-    if not {"ax", "ay", "az", "gx", "gy", "gz"} <= set(at) or (
-        table.shape[1] != len(wanted.columns)
-    ):
+    turns = _turn_reading(wanted, table)
+    if turns is None:
         return {}
-    acc, gyr = (table[:, [at[kind + axis] for axis in "xyz"]] for kind in "ag")
-    gravity = estimate_gravity(acc)
-    if gravity is None:
-        return {}
-    reads = estimate_rate_unit(np.arange(len(table)) / 100.0, acc, gyr, gravity)
+    reads, gyr, gravity = turns
     counts = np.isfinite(gyr).all() and (gyr == np.round(gyr)).all()
-    if reads is None:
-        return {}
     fits = {"rad/s": 1.0, "deg/s": float(np.rad2deg(1.0)), "mrad/s": 1e3}
     if wanted.gyr_unit:
         fits = {wanted.gyr_unit: 1 / wanted.gyr_scale}
     elif counts:
         # each full scale would be another rate
-        fits = {str(scale): scale.size for scale in counts_beside(gravity.size)}
+        fits = {str(scale): scale.size for scale in counts_beside(gravity)}
     rates = {unit: 100 * reads / one for unit, one in fits.items()}
     sane = {u: rate for u, rate in rates.items() if MIN_RATE_HZ <= rate <= MAX_RATE_HZ}
     if counts:
@@ -268,3 +293,24 @@ def rates_by_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
     return dict(
         sorted(sane.items(), key=lambda one: abs(np.log(one[1] / USUAL_RATE_HZ)))
     )
+
+
+def _turn_reading(
+    wanted: ReadOptions, table: Array
+) -> tuple[float, Array, float] | None:
+    """What 1 rad/s reads at 100 Hz, the rates (n, 3), and what gravity reads.
+
+    None if rows (n, k) do not have both sensors, or their turns tell nothing.
+    """
+    at = {c.partition("=")[0]: i for i, c in enumerate(wanted.columns)}
+    if not {*CHANNELS} <= set(at) or table.shape[1] != len(wanted.columns):
+        return None
+    acc, gyr = (table[:, [at[kind + axis] for axis in "xyz"]] for kind in "ag")
+    signs = [[-1.0 if k + x in wanted.reversed else 1.0 for x in "xyz"] for k in "ag"]
+    acc, gyr = acc * signs[0], gyr * signs[1]
+    gravity = estimate_gravity(acc)
+    if gravity is None:
+        return None
+    clock = np.arange(len(table)) / 100.0
+    reads = estimate_rate_unit(clock, acc, gyr, gravity)
+    return None if reads is None else (reads, gyr, gravity.size)

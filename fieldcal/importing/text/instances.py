@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from fieldcal.importing.text.tagged_lines import SENSORS
+from fieldcal.importing.text.tagged_lines import is_of_sensor
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
 
 NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "addr",
@@ -126,7 +126,7 @@ def tells_devices(name: str) -> bool:
 def _are_sensors(column: Sequence[str]) -> bool:
     """Whether cells name the two sensors of one IMU."""
     words = {*column}
-    return all(any(SENSORS[kind].search(w) for w in words) for kind in ("a", "g"))
+    return all(any(is_of_sensor(w, kind, words) for w in words) for kind in "ag")
 
 
 def _moves(cells: Sequence[str]) -> bool:

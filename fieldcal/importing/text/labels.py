@@ -109,6 +109,9 @@ _LETTER = re.compile("[A-Za-z_:]")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _NAMED = re.compile(r"([A-Za-z_]\w*)\s*[:=]")
 
+_OF_ALL = {"", "xyz", "value", "values", "data", "axes"}
+"""Words before an axis that say that others follow."""
+
 Labelled = tuple[str, str]
 """A label and its value."""
 
@@ -240,7 +243,7 @@ def _split_labels(line: str) -> list[tuple[str, str]]:
     parts = _LABEL.split(line)
     if len(parts) < len(AXES):
         return []
-    labels, texts = [" ".join(one.split()) for one in parts[1::2]], parts[::2]
+    labels, texts = [_bare_label(one) for one in parts[1::2]], parts[::2]
     for i, label in enumerate(labels):
         sensor = _SENSOR.fullmatch(texts[i])
         if sensor and label.lower() in AXES:
@@ -248,6 +251,17 @@ def _split_labels(line: str) -> list[tuple[str, str]]:
     if any(map(str.isalnum, _NAME.sub("", texts[0], 1))):
         return []
     return [*zip(labels, texts[1:], strict=True)]
+
+
+def _bare_label(label: str) -> str:
+    """A label with single spaces; of one that names all axes and one, the one.
+
+    >>> _bare_label("XYZ values - X"), _bare_label("Accel  X")
+    ('X', 'Accel X')
+    """
+    words = label.split()
+    others = {word.strip("-:").lower() for word in words[:-1]}
+    return words[-1] if "xyz" in others and others <= _OF_ALL else " ".join(words)
 
 
 def _split_unit(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:

@@ -14,7 +14,12 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
-from fieldcal.importing.text.text_lines import MISSING, plain_numbers, split_lines
+from fieldcal.importing.text.text_lines import (
+    COMMENTS,
+    MISSING,
+    plain_numbers,
+    split_lines,
+)
 from fieldcal.importing.text.text_top import with_points
 
 
@@ -63,7 +68,8 @@ class NumberTable:
         if separator != ",":
             lines = [with_points(line) for line in lines]
         try:
-            table = list(np.loadtxt(lines, **how).T)
+            # of no lines, numpy warns
+            table = list(np.loadtxt(lines, **how).T) if lines else []
         except ValueError:
             table = []
         if len(table) != len(use):
@@ -104,7 +110,11 @@ def _is_said(line: str) -> bool:
 
     >>> [_is_said(x) for x in ("MPU6050 connected, 2 retries", "0.12,-3e", "X: nan")]
     [True, False, False]
+    >>> _is_said("// mark 12345")
+    True
     """
+    if line.lstrip().startswith(COMMENTS):
+        return line.isprintable()
     words = re.findall(r"[^\W\d_]+", line)
     letters = sum(len(w) for w in words if len(w) > 1)
     row = bool({*words} & {*MISSING})

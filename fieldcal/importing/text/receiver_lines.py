@@ -20,6 +20,8 @@ from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
 
 _LINE = re.compile(r"\s*[#%](RAWIMUS?X?A,[^;]*;([^*]*))\*([0-9A-Fa-f]{8})\s*")
 
+_CORRECTED = re.compile(r"\s*[#%]((?:IMURATE)?CORRIMU(?:DATA)?S?A),")
+
 _MESSAGE = re.compile(r"\s*[#%<]\w+,")
 
 FIELDS = 9
@@ -57,6 +59,16 @@ class ReceiverLines(TextForm):
             return found
 
         return read
+
+
+def corrected_messages(lines: Sequence[str]) -> str:
+    """Name of messages of which the receiver has taken what a sensor shows; or "".
+
+    >>> corrected_messages(["%CORRIMUDATASA,2209,4.0;2209,4.0,0,0,0,0,0,0*12345678"])
+    'CORRIMUDATASA'
+    """
+    said = (_CORRECTED.match(line) for line in lines)
+    return next((one[1] for one in said if one is not None), "")
 
 
 def _row(line: str) -> str | None:

@@ -5,6 +5,8 @@
     ACCE;1.234;0.1;0.2;9.8             accelerometer and gyroscope go together
     GYRO;1.235;0.01;0.02;0.03
     $COL,IMU,time,wx,wy,wz             names, and units, of the lines $IMU,0.01,...
+    0.1  0.2  9.8  G                   the unit tells the sensor; without times, lines
+    1.2  3.4  5.6  o/s                 of both go together as they come in turn
 
 A line of the gyroscope goes with the nearest of the accelerometer; nothing is
 interpolated.
@@ -14,13 +16,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple, Self
 
 from fieldcal.importing.text.nearest_lines import NearestLines
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
-from fieldcal.importing.words.heading_units import parse_unit
+from fieldcal.importing.words.heading_units import parse_unit, sensor_of_unit
 from fieldcal.importing.words.heading_words import (
     bare_axis,
     heading_meaning,
@@ -46,7 +49,7 @@ MIN_LINES = 2
 SIGN = "$"
 """What may stand before the word, as in messages of receivers."""
 
-_WORD = re.compile(r"\$?[^\W\d][^,;\t]*")
+_WORD = re.compile(r"(?:\$?[^\W\d]|[°º]/)[^,;\t]*")
 
 
 class LineKind(NamedTuple):
@@ -107,32 +110,44 @@ class TaggedLines(TextForm):
             return None
         here = [row for row in rows if len(row) == acc.width and row[place] == acc.word]
         time = next((i for i in range(acc.width) if _grows(row[i] for row in here)), -1)
-        if gyr is not None and (time < 0 or _are_apart(rows, place, (acc, gyr), time)):
+        if gyr is not None and (
+            (time < 0 and not _in_turn(rows, place, (acc, gyr)))
+            or _are_apart(rows, place, (acc, gyr), time)
+        ):
             return None
         return cls(parted, place, acc, gyr, time)
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
-        here = {self._place, self._time}
+        here = {self._place, self._time} - {-1}
         pairs = NearestLines(self._gyr.width - len(here) if self._gyr else 0)
+        turns = Counter[str]()
+
+        def time(word: str, row: Sequence[str]) -> float | None:
+            """Time of a line, or which it is of those with its word."""
+            if self._time < 0:
+                turns[word] += 1
+                return float(turns[word])
+            cell = row[self._time]
+            return float(cell) if is_number(cell, False) else None
 
         def read(lines: Sequence[str]) -> list[str]:
             found = [] if lines else pairs.rest()
             for line in lines:
                 row = split_cells(line, self._separator)
                 word = row[self._place] if len(row) > self._place else ""
-                if word == self._acc.word and is_number(row[self._time], False):
-                    if self._gyr is None:
-                        found.append(row)
-                    else:
-                        found += pairs.force(float(row[self._time]), row)
-                elif self._gyr and (word, len(row)) == (
-                    self._gyr.word,
-                    self._gyr.width,
-                ):
-                    if is_number(row[self._time], False):
-                        rates = self._of_gyroscope(row)
-                        found += pairs.rate(float(row[self._time]), rates)
+                if self._gyr is None:
+                    own = word == self._acc.word and is_number(row[self._time], False)
+                    found += [row] if own else []
+                    continue
+                kind = (word, len(row))
+                own = kind == (self._gyr.word, self._gyr.width)
+                if not own and word != self._acc.word:
+                    continue
+                if (t := time(word, row)) is None:
+                    continue
+                rates = self._of_gyroscope(row) if own else []
+                found += pairs.rate(t, rates) if own else pairs.force(t, row)
             return [(self._separator or " ").join(row) for row in found]
 
         return read
@@ -140,6 +155,32 @@ class TaggedLines(TextForm):
     def _of_gyroscope(self, row: Sequence[str]) -> list[str]:
         """Cells of a line of the gyroscope, but its word and time."""
         return [c for i, c in enumerate(row) if i not in (self._place, self._time)]
+
+
+def is_of_sensor(word: str, sensor: str, among: Collection[str]) -> bool:
+    """Whether a word among others names a sensor, of `SENSORS`.
+
+    It may be a unit of its values, or its first letter. A lone g is either: beside a
+    unit of rates it is one of forces, and beside an a it stands for the gyroscopes.
+
+    >>> is_of_sensor("G", "a", ["G", "o/s"]), is_of_sensor("G", "g", ["A", "G", "M"])
+    (True, True)
+    """
+    if SENSORS[sensor].search(word):
+        return True
+    if any(sensor_of_unit(one) == "g" for one in among):
+        return sensor_of_unit(word) == sensor
+    letters = {one.lower().lstrip(SIGN) for one in among}
+    return {*"ag"} <= letters and word.lower().lstrip(SIGN) == sensor
+
+
+def _in_turn(
+    rows: Sequence[Sequence[str]], place: int, kinds: tuple[LineKind, LineKind]
+) -> bool:
+    """Whether lines of two kinds always follow each other."""
+    words = [row[place] for row in rows if len(row) > place]
+    both = [word for word in words if word in {kind.word for kind in kinds}]
+    return len(both) > len("ag") and all(a != b for a, b in pairwise(both))
 
 
 def _are_apart(
@@ -211,12 +252,13 @@ def _chosen(kinds: Sequence[LineKind]) -> tuple[LineKind | None, LineKind | None
     if len({kind.word for kind in kinds}) < len("ab"):
         return None, None
     plain = [kind for kind in kinds if not OTHER_QUANTITY.search(kind.word)]
-    of = {s: [k for k in plain if has.search(k.word)] for s, has in SENSORS.items()}
+    words = {kind.word for kind in plain}
+    of = {s: [k for k in plain if is_of_sensor(k.word, s, words)] for s in SENSORS}
     if of["imu"] and not of["a"]:
         return of["imu"][0], None
     if of["a"]:
         first = of["a"][0]
-        gyr = [k for k in of["g"] if not SENSORS["a"].search(k.word)]
+        gyr = [k for k in of["g"] if not is_of_sensor(k.word, "a", words)]
         return first, (gyr[0] if gyr else None)
     # words of equal lines say what was done, or which device it was
     wide = [kind for kind in kinds if kind.width > len("txyz")]

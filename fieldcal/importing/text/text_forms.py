@@ -1,8 +1,10 @@
 r"""Texts that are not plain columns, written as such: quotes, labels, times of a clock.
 
     "0,12","0,34"                      quoted, also with decimal commas
+    "1,714,746"  1 714 746  1'714'746  thousands that are set apart
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
     Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
+    AcX,12,AcY,-45,AcZ,16384           values behind cells with their names
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
     $IMU,0.01,0.1*5A                   lines with a checksum
     %RAWIMUSA,2209,4916.2;...*1fb76c28  messages of a receiver
@@ -26,13 +28,13 @@ that everything behind it knows columns of numbers alone.
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Collection, Sequence
 
 from fieldcal.importing.text.bare_fractions import BareFractions
 from fieldcal.importing.text.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.text.dataflash_text import DataflashText
+from fieldcal.importing.text.grouped_digits import GroupedDigits
 from fieldcal.importing.text.labels import (
     CLOCKS,
     TitledValues,
@@ -44,6 +46,7 @@ from fieldcal.importing.text.labview_text import LabviewText
 from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
 from fieldcal.importing.text.nested_values import NestedValues
+from fieldcal.importing.text.paired_cells import PairedCells
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.importing.text.scaled_counts import ScaledCounts
@@ -57,6 +60,7 @@ from fieldcal.importing.text.text_form import (
     is_true_of_most,
     take_row,
 )
+from fieldcal.importing.text.text_lines import split_quoted
 from fieldcal.importing.text.text_top import find_separator, split_cells
 from fieldcal.importing.text.vectornav_lines import VectorNavLines
 from fieldcal.importing.text.written_numbers import FortranNumbers, UnitCells
@@ -118,12 +122,9 @@ class QuotedCells(TextForm):
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
-
-        def read(lines: Sequence[str]) -> list[str]:
-            rows = csv.reader(lines, delimiter=self._old, skipinitialspace=True)
-            return [self._new.join(row) for row in rows]
-
-        return read
+        return lambda lines: [
+            self._new.join(split_quoted(line, self._old)) for line in lines
+        ]
 
 
 class LabelledValues(TextForm):
@@ -159,15 +160,20 @@ class LabelledValues(TextForm):
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
         row: dict[str, str] = {}
-        titled = TitledValues()
+        titled, begun = TitledValues(), False
 
         def read(lines: Sequence[str]) -> list[str]:
+            nonlocal begun
             found = []
             for line in lines:
                 titles = titled.titles
                 said = titled.of(line)
                 bare = not said and titles == titled.titles
                 values = {k: v for k, v in said if k in self.names}
+                begun = begun or bool(values)
+                if said and not begun:
+                    # what stands above the rows may say their rate
+                    found.append(line)
                 if bare and line_shape(line) not in self._others:
                     # no row: whoever reads rows says so
                     found.append(line)
@@ -297,8 +303,8 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
-    CheckedLines, EchoedMessages, EndedLines, DatabasePoints, QuotedCells,
-    FortranNumbers, UnitCells,
+    CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
+    QuotedCells, PairedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, BarTable, ListCells,
     SplitDecimals, SensorCodes, TaggedLines, ArrivalPrefix, HexCells, BareFractions,
     ClockColumn,

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import csv
+
 from fieldcal.core.samples import Array
 from fieldcal.session.arrow_columns import float_values
 
-MISSING = ("", "null", "NULL", "None", "NA", "N/A", "n/a", "#N/A", "NaN", "nan", "-")
-"""What stands in a cell that holds no value."""
+MISSING = ("", "null", "NULL", "None", "NA", "N/A", "n/a", "#N/A", "NaN", "nan", "-",
+           "--", "---", "?", "1.#QNAN", "-1.#QNAN", "1.#QNAN0", "-1.#QNAN0", "1.#IND",
+           "-1.#IND", "1.#IND00", "-1.#IND00")  # fmt: skip
+"""What stands in a cell that holds no value; the last as older C libraries of Microsoft
+write one that cannot be calculated."""
+
+COMMENTS = ("# ", "% ", "// ")
+"""What lines that are no rows begin with, in many programs; without the space behind
+it, a message of a receiver may."""
 
 MINUS = "\u2212"
 """The sign that spreadsheets write before negative numbers in some languages."""
@@ -23,6 +32,28 @@ def split_lines(data: bytes) -> list[str]:
         text = data.decode("cp1252", errors="replace")
     lines = text.replace("\r\n", "\n").replace(MINUS, "-").split("\n")
     return [line for line in lines if line.strip()]
+
+
+def split_quoted(line: str, separator: str) -> list[str]:
+    """Cells of a line, without the quotes within which a separator parts none.
+
+    A carriage return within a line, or a quote that nothing ends, parts none either.
+
+    >>> split_quoted('"1,000", 2,"x"', ","), split_quoted('1,"2', ",")
+    (['1,000', '2', 'x'], ['1', '"2'])
+    """
+    if '"' not in line:
+        return line.split(separator)
+    try:
+        (row,) = csv.reader(
+            [line.replace("\r", " ")],
+            delimiter=separator,
+            skipinitialspace=True,
+            strict=True,
+        )
+    except (ValueError, csv.Error):
+        return line.split(separator)
+    return row
 
 
 def top_lines(data: bytes, many: int = TOP) -> list[str]:

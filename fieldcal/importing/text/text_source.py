@@ -21,6 +21,10 @@ AT_ONCE = 1 << 12
 """Lines whose forms are undone at once: who looks at the top need not wait for more."""
 
 
+FILL = b"\0\xff"
+"""What fills the end of a file that a device made longer than it needed."""
+
+
 class TextSource:
     """Lines of a text.
 
@@ -65,16 +69,27 @@ class TextSource:
         for data in as_utf8(self._bytes()):
             end = data.rfind(b"\n") + 1
             if not end:
-                rest += data
+                # what fills a file may be as long as the rest of it
+                rest += data if data.strip(FILL) else data[:1]
                 continue
             # one copy: there may be gigabytes of them
             whole, rest = b"".join((rest, memoryview(data)[:end])), data[end:]
             if not whole.isspace():
-                yield whole
+                yield _with_line_feeds(whole)
+        if rest.endswith((FILL[:1], FILL[1:])):
+            self._say_filled()
         # a number that was cut off is another number
-        if rest.strip() and not self._recording.ends_early:
+        elif rest.strip() and not self._recording.ends_early:
             # a file without a line feed may have the other kind of ends of lines
             yield rest.replace(b"\r", b"\n")
+
+    def _say_filled(self) -> None:
+        """Say that a device had not filled the file that it had made beforehand."""
+        said = (
+            "behind its last whole line it is filled with bytes that hold nothing, as"
+            " where a device makes a file before it writes into it: they are left out"
+        )
+        self._recording.says += [said] if said not in self._recording.says else []
 
     def _bytes(self) -> Iterator[bytes]:
         """Bytes of the text, unpacked."""
@@ -91,3 +106,14 @@ class TextSource:
                 f"{path}: {self._member} cannot be read: {error}; copy it again from"
                 " where it came"
             ) from error
+
+
+def _with_line_feeds(lines: bytes) -> bytes:
+    r"""Whole lines with a line feed at the end of each, where some have another sign.
+
+    >>> _with_line_feeds(b"1,2\r3,4\r\n"), _with_line_feeds(b"1,2\r\n")
+    (b'1,2\n3,4\n', b'1,2\r\n')
+    """
+    if lines.count(b"\r") == lines.count(b"\r\n"):
+        return lines
+    return lines.replace(b"\r\n", b"\n").replace(b"\r", b"\n")

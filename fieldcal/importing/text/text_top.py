@@ -17,6 +17,7 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.headings.heading import Column, Heading
 from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.text.text_lines import split_quoted
 from fieldcal.importing.words.heading_units import parse_unit
 
 SEPARATORS = (";", "\t", ",")
@@ -109,7 +110,8 @@ def split_cells(line: str, separator: str | None) -> list[str]:
     """Cells of a line, without spaces and quotes about them."""
     if '"' not in line:
         return [*map(str.strip, line.split(separator))]
-    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
+    cells = split_quoted(line, separator) if separator else line.split()
+    return [cell.strip().strip('"').strip() for cell in cells]
 
 
 def first_numbers(lines: Sequence[str], separator: str | None) -> int:

@@ -22,7 +22,7 @@ CLOCK_PARTS = {"t_h": 3600.0, "t_min": 60.0, **FRACTIONS}
 """Columns that are added to the seconds of ``t``, and s in one of each."""
 
 COUNTED = (2.0**16, 2.0**24, 2.0**32)
-"""Where counters of a device begin again."""
+"""Where counters of a device begin again: at 0, or at minus a half with a sign."""
 
 DIVIDED = tuple(many * tick for many in COUNTED for tick in (1e-6, 1e-3))
 """Likewise of counters of us and ms that a program divides before it writes them, s."""
@@ -183,6 +183,7 @@ class RowTimes:
         for name, size in CLOCK_PARTS.items():
             if name in columns:
                 t = t + columns[name] * size
+        t = -t if "t" in self._wanted.reversed else t
         known = np.flatnonzero(np.isfinite(t))
         if len(known):
             self._began = float(t[known[0]]) if np.isnan(self._began) else self._began
@@ -223,14 +224,16 @@ class RowTimes:
     def _period(self, before: float, began: float, scale: float) -> float:
         """Where a clock began again that went from one time to another; 0 if not."""
         near = NEAR_STEPS * self._usual
-        own = (many * scale for many in COUNTED)
+        own = [many * scale for many in COUNTED]
         # of a period of few steps any time is near both ends
-        divided = (p for p in DIVIDED if p > LONG_PERIOD * near)
-        for period in (*own, *divided, *PERIODS):
-            if 0 <= began < near and 0 < period - before < near:
+        counted = own + [p for p in DIVIDED if p > LONG_PERIOD * near]
+        signed = [(-p / 2, p) for p in counted]
+        unsigned = [(0.0, p) for p in (*counted, *PERIODS)]
+        for low, period in (*unsigned, *signed):
+            if 0 <= began - low < near and 0 < low + period - before < near:
                 said = (
-                    f"its clock ends at {period:g} s and begins again: the times behind"
-                    " go on"
+                    f"its clock ends at {low + period:g} s and begins again"
+                    f"{f' at {low:g} s' if low else ''}: the times behind go on"
                 )
                 self.says += [said] if said not in self.says else []
                 return period

@@ -218,7 +218,8 @@ class RowValidator:
             raise InputError(
                 f"{self._name}: its times fall from row to row from"
                 f" {self._place(int(numbers[0]))} on: it is written newest first; sort"
-                " its rows by their time"
+                " its rows by their time; or, if a timer counts down in it, name that"
+                " column -t in --columns"
             )
         before, self._before = self._before, float(t[-1]) if len(t) else self._before
         if len(t) and self._newest < t[0] and (steps > 0).all():

@@ -119,13 +119,17 @@ def check_stated_times(name: str, unit: str, t: Array) -> None:
     Raises
     ------
     InputError
-        If they make far less than any log has, and in another unit what logs have.
+        If they make far less than any log has, or more, and in another unit what logs
+        have.
 
     """
     step, size = _step(t), TIME_UNITS[unit]
-    if not step or 1 / step >= STATED_HZ:
+    if not step or STATED_HZ <= 1 / step <= RATES_HZ[1]:
         return
-    fits = [u for u in possible_time_units(t / size) if TIME_UNITS[u] < size]
+    finer = 1 / step < STATED_HZ
+    fits = [u for u in possible_time_units(t / size)
+            if u != "d" and (TIME_UNITS[u] < size if finer else TIME_UNITS[u] > size)
+            ]  # fmt: skip
     if fits:
         rate = 1 / (step / size * TIME_UNITS[fits[0]])
         raise InputError(

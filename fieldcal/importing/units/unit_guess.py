@@ -32,6 +32,7 @@ from fieldcal.importing.units.scales import (
     ANALOG,
     GYR_OUT,
     MIN_ROWS_ALONE,
+    Scale,
     fitting_scales,
     gain_scales,
     half_angle_scales,
@@ -189,7 +190,7 @@ class _Guess:
             unit, why = assumed_time_unit(name, block.t, block.acc)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
-        elif "t" in said.named and not are_means(block.acc):
+        elif "t" in said.named and not (said.batch or are_means(block.acc)):
             check_stated_times(name, said.time_unit, block.t)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
@@ -295,12 +296,12 @@ class _Guess:
             fits = fitting_scales(reads, halves, GYR_OUT[not gravity.round])
         elif self._gained:
             # who writes gains of velocity, writes gains of angle beside them
-            degrees = gain_scales(self._step, "deg/s", 180 / np.pi)
-            scales = (*gain_scales(self._step, "rad/s"), *degrees)
-            fits = fitting_scales(reads, scales, GYR_OUT[not gravity.round])
+            fits = self._angle_gains(reads, GYR_OUT[not gravity.round])
         elif self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
             # who writes one sensor's registers as they are, writes the other's so too
             fits = counts
+        # some write gains of angle beside the force itself; a wrong rate comes near
+        fits = fits or self._angle_gains(reads, GYR_OUT[0])
         shows = f"as gravity turns, 1 rad/s reads {rounded_text(reads, 4)}"
         shows = f"{HALVED}; {shows}" if self._halved else shows
         if len(fits) != 1:
@@ -314,6 +315,14 @@ class _Guess:
         if (fits[0].unit, fits[0].lsb) != ("rad/s", 1):
             self.found["angular_rate"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
+
+    def _angle_gains(self, reads: float, within: float) -> list[Scale]:
+        """Scales of what an angle gains in a row, by what 1 rad/s reads in it."""
+        if not self._step:
+            return []
+        degrees = gain_scales(self._step, "deg/s", 180 / np.pi)
+        scales = (*gain_scales(self._step, "rad/s"), *degrees)
+        return fitting_scales(reads, scales, within)
 
     @property
     def _gained(self) -> bool:

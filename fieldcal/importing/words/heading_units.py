@@ -16,7 +16,7 @@ SPELLINGS = {
     "g": ("g", "g's", "gs", "g-force", "gforce", "g0", "gn"),
     "deg/s": ("deg/s", "°/s", "dps", "degps", "deg s-1", "deg/sec", "°/sec", "d/s",
               "deg s^-1", "deg.s-1", "deg.s^-1", "degrees/s", "degree/s",
-              "degrees/sec", "degrees/second", "deg/second", "º/s"),
+              "degrees/sec", "degrees/second", "deg/second", "º/s", "o/s"),
     "mdeg/s": ("mdeg/s", "mdps", "m°/s", "millideg/s", "mdeg/sec"),
     "udeg/s": ("udeg/s", "udps", "µdps", "μdps"),
     "deg/h": ("deg/h", "°/h", "deg/hr", "°/hr", "dph", "deg/hour"),
@@ -92,6 +92,16 @@ def parse_unit(text: str) -> str | None:
         return CAPITALS[bare]
     bare = bare.lower().replace("/per/", "/").replace(" per ", "/")
     return _WRITTEN.get(bare) or _WRITTEN.get(bare.strip("[]() "))
+
+
+def sensor_of_unit(text: str) -> str:
+    """Kind of sensor, a or g, whose values have a unit; "" of any other text.
+
+    >>> sensor_of_unit("G"), sensor_of_unit("o/s"), sensor_of_unit("m")
+    ('a', 'g', '')
+    """
+    unit = parse_unit(text)
+    return next((kind for kind in "ag" if unit in UNITS[kind]), "")
 
 
 def split_thermometer_name(name: str, unit: str) -> tuple[str, str] | None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 from fieldcal.importing.words.heading_units import (
@@ -51,16 +52,22 @@ _ANGLES = {"rad": "rad/s", "deg": "deg/s"}
 _NO_RATE = ("angle", "roll", "pitch", "yaw", "heading", "euler", "theta", "phi")
 """Words of angles that are no rates."""
 
-COUNTERS = ("packet", "packets", "counter", "count", "cnt", "index", "idx", "number",
-            "nr", "no", "frame", "row", "line", "sample", "samples", "seq", "sequence",
-            "id", "n")  # fmt: skip
+COUNTERS = ("packet", "packets", "counter", "count", "cntr", "cnt", "index", "idx",
+            "number", "nr", "no", "frame", "row", "line", "sample", "samples", "seq",
+            "sequence", "id", "n")  # fmt: skip
 """Words of columns that count rows or messages."""
+
+COUNTED = ("data", "message", "messages", "msg", "record", "records")
+"""Words of what is counted, which stand beside them."""
 
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host", "t_h": "t_h",
           "t_min": "t_min"}  # fmt: skip
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated",
             "rate", *AXIS)  # fmt: skip
 """Words that tell no IMU from another where all of one kind have them."""
+
+NAMES = 4096
+"""Names whose meaning is remembered: a program prints the same ones in each line."""
 
 LONGEST = 300
 """Characters of a name; what is longer is a line without columns."""
@@ -102,6 +109,7 @@ class HeadingMeaning(NamedTuple):
     half: bool = False
 
 
+@lru_cache(NAMES)
 def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
     """Return the meaning of a name; None if it names no channel.
 
@@ -269,11 +277,11 @@ def words_in_name(name: str) -> list[str]:
 def is_counter(name: str) -> bool:
     """Whether a name is that of a counter, whose numbers are no times.
 
-    >>> is_counter("Packet number"), is_counter("sample_time"), is_counter("")
-    (True, False, False)
+    >>> [is_counter(one) for one in ("Packet number", "DATA_CNTR", "sample_time", "")]
+    [True, True, False, False]
     """
     words = words_in_name(name)
-    return bool(words) and {*words} <= {*COUNTERS}
+    return bool({*words} & {*COUNTERS}) and {*words} <= {*COUNTERS, *COUNTED}
 
 
 def _find_phrase(words: Sequence[str], phrase: Sequence[str]) -> int | None:

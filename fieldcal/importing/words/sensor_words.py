@@ -10,12 +10,12 @@ AXIS = ("axis", "achse", "axe", "eje", "asse", "eixo", "os", "ось")
 
 SENSORS = {
     "a": (
-        "a f acc accel accelerometer acceleration accs accl acce ac"
+        "a f acc accel accelero accelerometer acceleration accs accl acce ac"
         " beschleunigung aceleracion aceleracao accelerazione versnelling"
         " przyspieszenie ускорение 加速度 가속도"
     ).split(),
     "g": (
-        "g w gyr gyro gyroscope gyros omega rate gy gyroskop giroscopio giroskop"
+        "g w pqr gyr gyro gyroscope gyros omega rate gy gyroskop giroscopio giroskop"
         " drehrate winkelgeschwindigkeit гироскоп 角速度 陀螺仪 ジャイロ 각속도 자이로"
     ).split(),
     "m": "m mag magnetometer magnetic compass 磁场 地磁気 磁気".split(),
@@ -29,6 +29,7 @@ PHRASES = (
     (("angular", "vel"), "g"),
     (("ang", "vel"), "g"),
     (("rotation", "rate"), "g"),
+    (("angle", "rate"), "g"),
     (("gyro", "rotation"), "g"),
     (("velocidad", "angular"), "g"),
     (("velocidade", "angular"), "g"),

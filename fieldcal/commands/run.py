@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.find_device import find_device
-from fieldcal.commands.help import EXIT_INTERNAL_ERROR, EXIT_INTERRUPTED
 from fieldcal.commands.repeated_option import StoreRepeated
 from fieldcal.commands.run_operator import run_operator
 from fieldcal.commands.run_page import LOCAL, serve_page, show_end_on_page
@@ -158,25 +157,26 @@ def _add_task_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command; with --headless every end is reported as an event."""
+    """Carry out the command; with --headless all of standard error is events."""
+    if not args.headless:
+        return _prepare_and_run(args)
+    from fieldcal.run.operator.event_lines import lines_as_events
     from fieldcal.run.operator.script import report_event
 
-    code, said = 0, None
-    try:
+    with lines_as_events():
         code = _prepare_and_run(args)
-    except FieldcalError as error:
-        code, said = error.exit_code, str(error)
-        raise
-    except KeyboardInterrupt:
-        code, said = EXIT_INTERRUPTED, "interrupted"
-        raise
-    except Exception as error:
-        code, said = EXIT_INTERNAL_ERROR, f"broke on {type(error).__name__}"
-        raise
-    finally:
-        if args.headless:
-            report_event("end", exit_code=code, error=said)
+    report_event("end", exit_code=code, error=None)
     return code
+
+
+def tell_failure(arguments: Sequence[str], said: str, code: int) -> bool:
+    """Tell the error that ended a run as its last event; False without --headless."""
+    from fieldcal.run.operator.script import report_event
+
+    if "--headless" not in arguments:
+        return False
+    report_event("end", exit_code=code, error=said)
+    return True
 
 
 def _prepare_and_run(args: argparse.Namespace) -> int:

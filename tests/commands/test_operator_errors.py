@@ -33,12 +33,13 @@ def failed(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """The sentence that a run ends with."""
     run = ["run", "two_position", "--headless", "--device", url, "-o", str(folder)]
     assert main([*run, "--patience", "0"]) == 3
-    *before, last = capsys.readouterr().err.strip().splitlines()
+    events = [json.loads(line) for line in capsys.readouterr().err.splitlines()]
+    *before, last = events
     if folder.exists():
-        assert "--resume" in before[-2]
-        assert "with --device if its port is another now" in before[-2]
-    said = last.removeprefix("fieldcal run: ")
-    assert said != last and not re.search(r"\.\s|[\[{<]|Error", said)
+        assert "--resume" in before[-1]["text"]
+        assert "with --device if its port is another now" in before[-1]["text"]
+    said = str(last["error"])
+    assert not re.search(r"\.\s|[\[{<]|Error", said)
     return said
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.core.errors import DeviceError, FieldcalError
+from fieldcal.core.errors import DeviceError, FieldcalError, SessionInUse
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -131,6 +131,8 @@ def report_broken_run(
     from fieldcal.run.begun_before import has_taken_position
     from fieldcal.session.marks import MARKS
 
+    if isinstance(error, SessionInUse):  # who records there says how it goes on
+        return
     own = args.resume or args.records
     if not own or not os.path.exists(folder / MARKS):  # False where nobody may look
         return

@@ -25,6 +25,7 @@ from fieldcal.cli import main
 from fieldcal.core.errors import SessionError
 from fieldcal.drivers.driver import Driver, open_driver
 from fieldcal.run.movers import VirtualMover
+from fieldcal.run.plan_file import default_positions
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 
@@ -111,8 +112,9 @@ def test_the_same_command_once_more_leaves_the_run_that_goes_on_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """In a second terminal, before the first run has heard a sample."""
-    folder = tmp_path / "s"
-    with Recorder(folder, {"grade": "tactical"}) as recorder:
+    folder, held = tmp_path / "s", default_positions("two_position")
+    about = {"run": {"procedure": "two_position"}, "position": held}
+    with Recorder(folder, about) as recorder:
         recorder.mark("asked", position=0)
         there = sorted(folder.iterdir())
         with VirtualMover(["--serial", "witmotion"], once=False) as device:
@@ -122,6 +124,11 @@ def test_the_same_command_once_more_leaves_the_run_that_goes_on_alone(
                              "--device", url, "-o", str(folder)]) in (2, 3)  # fmt: skip
                 assert "to go on" not in capsys.readouterr().err
                 assert sorted(folder.iterdir()) == there
+            url = f"serial:{device.port}?format=witmotion"
+            assert main(["run", "--resume", str(folder), "--device", url]) == 2
+            said = capsys.readouterr().err
+            assert "records into it: end that run first" in said
+            assert "to go on" not in said and "is kept in" not in said
     file = tmp_path / "file"
     file.write_text("mine")
     with pytest.raises(SessionError, match="is no folder; name one"):

@@ -13,7 +13,11 @@ from fieldcal.commands.find_device import find_device
 from fieldcal.commands.repeated_option import StoreRepeated
 from fieldcal.commands.run_operator import run_operator
 from fieldcal.commands.run_page import LOCAL, serve_page, show_end_on_page
-from fieldcal.commands.run_results import report_broken_run, write_junit
+from fieldcal.commands.run_results import (
+    report_broken_run,
+    tell_calculation,
+    write_junit,
+)
 from fieldcal.commands.run_statements import decide_as_stated, write_statements
 from fieldcal.commands.run_task import SESSIONS, make_room, make_task, session_to_resume
 from fieldcal.commands.run_timeouts import (
@@ -211,6 +215,7 @@ def _run_and_show(
     history = History(args.history or default_location())
     try:
         found, truth, others = _record_and_solve(args, task, folder, bounds, page)
+        tell_calculation(args)
         found = first_result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
         show_end_on_page(page, (), error)

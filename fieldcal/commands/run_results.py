@@ -21,8 +21,20 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import PlanTask
     from fieldcal.session.folder import Session
 
+CALCULATION = (
+    "the recording is complete, the device may be moved\ncalculating GO or NO-GO ..."
+)
+"""What is said until there is a result, which takes seconds."""
+
 UNTAKEN = "no position was taken, so the same command may begin again; "
 """What is said behind a run that broke off before it had anything to keep."""
+
+
+def tell_calculation(args: argparse.Namespace) -> None:
+    """Say that the recording is over, and what the wait is for, to a person."""
+    if not args.headless:
+        sys.stderr.write(f"{CALCULATION}\n")
+        sys.stderr.flush()
 
 
 def solve_and_decide(

@@ -184,8 +184,6 @@ def tell_failure(arguments: Sequence[str], said: str, code: int) -> bool:
 
 
 def _prepare_and_run(args: argparse.Namespace) -> int:
-    if _names_no_device(args):
-        find_device(args)
     if args.resume:
         folder = session_to_resume(args.resume)
         if write_statements(args, folder):
@@ -193,8 +191,18 @@ def _prepare_and_run(args: argparse.Namespace) -> int:
             if code is not None:
                 return code
     task, folder = make_task(args)
+    if not task.run.get("device") and task.mover["kind"] != "virtual":
+        find_device(args, _plan_states_mounting(args, task))
+        task, folder = make_task(args)
     with serve_page(args) as page:
         return _run_and_show(page, args, task, folder)
+
+
+def _plan_states_mounting(args: argparse.Namespace, task: PlanTask) -> bool:
+    from fieldcal import procedures
+
+    of_plan = args.procedure not in procedures.procedure_names()
+    return of_plan and "mounting" in task.tables.get("frame", {})
 
 
 def _run_and_show(
@@ -242,14 +250,6 @@ def _run_and_show(
         error.printed = bool(args.json)
         raise
     return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
-
-
-def _names_no_device(args: argparse.Namespace) -> bool:
-    """Whether a run of a procedure has no option that states the device."""
-    from fieldcal import procedures
-
-    said = args.device or args.virtual is not None or args.resume
-    return not said and args.procedure in procedures.procedure_names()
 
 
 def _record_and_solve(

@@ -217,3 +217,13 @@ def test_half_a_frame_at_the_end(
     assert said.endswith("hung up: check cable and power, then start again")
     block = Session.open(tmp_path / "s").block
     np.testing.assert_allclose(block.six, stream.samples.six[:-1], rtol=1e-6)
+
+
+def test_a_text_in_place_of_a_calibration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = tmp_path / "notes.txt"
+    text.write_text("hello\n")
+    assert main(["compare", str(text), str(text)]) == 2
+    said = capsys.readouterr().err
+    assert "notes.txt: is no calibration" in said and "session that was solved" in said

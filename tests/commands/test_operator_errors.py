@@ -227,3 +227,12 @@ def test_a_text_in_place_of_a_calibration(
     assert main(["compare", str(text), str(text)]) == 2
     said = capsys.readouterr().err
     assert "notes.txt: is no calibration" in said and "session that was solved" in said
+
+
+def test_to_go_on_with_the_last_run_where_there_is_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "--resume"]) == 2
+    said = capsys.readouterr().err
+    assert "no run is in sessions" in said and "--resume FOLDER" in said

@@ -130,7 +130,10 @@ def _run_guarded(name: str, arguments: list[str]) -> int:
             said, code = full, FieldcalError.exit_code
         else:
             said, code = _write_crash_file(name, arguments, error), EXIT_INTERNAL_ERROR
-    sys.stderr.write(f"fieldcal {name}: {said}\n")
+    # a command may have a form of its own for errors, optional as RARE is
+    tell_failure = getattr(command, "tell_failure", None)
+    if tell_failure is None or not tell_failure(arguments, said, code):
+        sys.stderr.write(f"fieldcal {name}: {said}\n")
     if "--json" in arguments and not printed:
         _write_failure(said, code)
     return code

@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.keep_result import keep_result
+
 if TYPE_CHECKING:
     from fieldcal.against import Match
     from fieldcal.against.rounds import CompareOutput, SimulatorRun
@@ -33,14 +35,12 @@ def run(args: argparse.Namespace) -> int:
     session = Session.open(args.session)
     found, model, said = _compare_session(args, session)
     content = found.to_json() | {"against": args.against}
-    written = [session.write_json(AGAINST, content)]
-    if model is not None:
-        written.append(
-            _write_patch(args.patch or DEFAULT_PATCH_FORMAT, session, model, said)
-        )
+    form = args.patch or DEFAULT_PATCH_FORMAT
+    patch = [] if model is None else [_write_patch(form, session, model, said)]
     for warning in (*session.warnings, *said, *found.warnings):
         sys.stderr.write(f"fieldcal diagnose: {warning}\n")
     _print_match(args, found, content)
+    written = [keep_result(session, AGAINST, content), *patch]
     gate = check_match(found, allowed)
     if args.junit:
         write_junit(args.junit, args.session.resolve().name, found, gate)

@@ -125,7 +125,10 @@ def read_calibration(path: Path) -> Calibration:
     except FileNotFoundError:
         raise InputError(f"{file} is not there: run fieldcal solve first") from None
     except (OSError, ValueError) as fault:
-        raise InputError(f"{file} cannot be read: {fault}") from None
+        raise InputError(
+            f"{file}: is no calibration ({fault}); name the folder of a session that"
+            " was solved, or its result.json"
+        ) from None
     try:
         return Calibration.from_json(document)
     except InputError as error:

@@ -9,8 +9,10 @@ from typing import IO, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
+from rich.table import Table
 from rich.text import Text
 
+from fieldcal.commands.row_lists import as_row_lists, cuts_cells
 from fieldcal.commands.spelling import spell
 from fieldcal.core.escaping import escape_invisible
 
@@ -62,10 +64,19 @@ class EscapingConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Render, with the text of each segment escaped by `shown`."""
+        """Render, with the text of each segment escaped by `shown`.
+
+        A table whose cells do not fit is rendered as a list of its rows.
+        """
         if self._spells and isinstance(renderable, Text):
             renderable = self._with_known_letters(renderable)
-        for segment in super().render(renderable, options):
+        drawn = super().render(renderable, options)
+        if isinstance(renderable, Table):
+            drawn = list(drawn)
+            width = (options or self.options).max_width
+            if cuts_cells(renderable, drawn, width):
+                drawn = super().render(as_row_lists(renderable), options)
+        for segment in drawn:
             if segment.control:
                 yield segment
             else:

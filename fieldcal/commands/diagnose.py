@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fieldcal.commands.keep_result import keep_result
 from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -149,7 +150,6 @@ def _diagnose_session(args: argparse.Namespace) -> int:
     content = found.to_json()
     if again is not None:
         content["twin"] = again.to_json(str(args.twin))
-    path = session.write_json(DIAGNOSIS, content)
     for warning in (*session.warnings, *found.warnings):
         sys.stderr.write(f"fieldcal diagnose: {warning}\n")
     if args.json:
@@ -158,6 +158,8 @@ def _diagnose_session(args: argparse.Namespace) -> int:
         from fieldcal.commands.diagnosis_view import show_diagnosis
 
         show_diagnosis(found, again, details=args.details)
+    path = keep_result(session, DIAGNOSIS, content)
+    if not args.json:
         sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.commands.report import write_report

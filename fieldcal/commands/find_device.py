@@ -29,8 +29,10 @@ TEXT_FORMAT = "format=text"
 """Part of the address of a text format, whose rates may be in rad/s or deg/s."""
 
 
-def find_device(args: argparse.Namespace) -> None:
+def find_device(args: argparse.Namespace, mounted: bool = False) -> None:
     """Find the only device that answers, and set it in the options.
+
+    How it is mounted is set as well, unless an option or the plan (`mounted`) says so.
 
     Raises
     ------
@@ -57,7 +59,8 @@ def find_device(args: argparse.Namespace) -> None:
             unit = rate_unit_from_turn(driver.blocks(), gravity, TURN_S)
             url += f"&gyr_unit={unit}" if unit else ""
     line = f'--device "{url}"'
-    if known.up and not args.mounting and known.mounting != PLAIN_MOUNTING:
+    mounted = mounted or bool(args.mounting)
+    if known.up and not mounted and known.mounting != PLAIN_MOUNTING:
         args.mounting = ",".join(known.mounting)
         line += f" --mounting={args.mounting}"
     _print_line(f"{found.says.partition(';')[0]}; {known.summary}")

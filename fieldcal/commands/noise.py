@@ -14,6 +14,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.keep_result import keep_result
+
 if TYPE_CHECKING:
     from fieldcal.calibration.limits import GradeLimits
     from fieldcal.core.samples import Block
@@ -78,7 +80,6 @@ def run(args: argparse.Namespace) -> int:
     content = found.to_json()
     folder = next((s for s, p in zip(sessions, args.sessions, strict=True)
                    if p.is_dir()), None)  # fmt: skip
-    path = folder.write_json(NOISE, content) if folder else None
     for warning in dict.fromkeys(w for s in sessions for w in s.warnings):
         sys.stderr.write(f"fieldcal noise: {warning}\n")
     if args.json:
@@ -87,8 +88,9 @@ def run(args: argparse.Namespace) -> int:
         from fieldcal.commands.noise_view import show_noise
 
         show_noise(found)
-        if path:
-            sys.stdout.write(f"written: {path}\n")
+    path = keep_result(folder, NOISE, content) if folder else None
+    if path and not args.json:
+        sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.report.noise_page import render_noise_page
         from fieldcal.session.folder import write_atomically

@@ -10,11 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.find_device import find_device
-from fieldcal.commands.help import EXIT_INTERNAL_ERROR, EXIT_INTERRUPTED
 from fieldcal.commands.repeated_option import StoreRepeated
 from fieldcal.commands.run_operator import run_operator
 from fieldcal.commands.run_page import LOCAL, serve_page, show_end_on_page
-from fieldcal.commands.run_results import report_broken_run, write_junit
+from fieldcal.commands.run_results import (
+    report_broken_run,
+    tell_calculation,
+    write_junit,
+)
 from fieldcal.commands.run_statements import decide_as_stated, write_statements
 from fieldcal.commands.run_task import SESSIONS, make_room, make_task, session_to_resume
 from fieldcal.commands.run_timeouts import (
@@ -158,30 +161,29 @@ def _add_task_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command; with --headless every end is reported as an event."""
+    """Carry out the command; with --headless all of standard error is events."""
+    if not args.headless:
+        return _prepare_and_run(args)
+    from fieldcal.run.operator.event_lines import lines_as_events
     from fieldcal.run.operator.script import report_event
 
-    code, said = 0, None
-    try:
+    with lines_as_events():
         code = _prepare_and_run(args)
-    except FieldcalError as error:
-        code, said = error.exit_code, str(error)
-        raise
-    except KeyboardInterrupt:
-        code, said = EXIT_INTERRUPTED, "interrupted"
-        raise
-    except Exception as error:
-        code, said = EXIT_INTERNAL_ERROR, f"broke on {type(error).__name__}"
-        raise
-    finally:
-        if args.headless:
-            report_event("end", exit_code=code, error=said)
+    report_event("end", exit_code=code, error=None)
     return code
 
 
+def tell_failure(arguments: Sequence[str], said: str, code: int) -> bool:
+    """Tell the error that ended a run as its last event; False without --headless."""
+    from fieldcal.run.operator.script import report_event
+
+    if "--headless" not in arguments:
+        return False
+    report_event("end", exit_code=code, error=said)
+    return True
+
+
 def _prepare_and_run(args: argparse.Namespace) -> int:
-    if _names_no_device(args):
-        find_device(args)
     if args.resume:
         folder = session_to_resume(args.resume)
         if write_statements(args, folder):
@@ -189,8 +191,18 @@ def _prepare_and_run(args: argparse.Namespace) -> int:
             if code is not None:
                 return code
     task, folder = make_task(args)
+    if not task.run.get("device") and task.mover["kind"] != "virtual":
+        find_device(args, _plan_states_mounting(args, task))
+        task, folder = make_task(args)
     with serve_page(args) as page:
         return _run_and_show(page, args, task, folder)
+
+
+def _plan_states_mounting(args: argparse.Namespace, task: PlanTask) -> bool:
+    from fieldcal import procedures
+
+    of_plan = args.procedure not in procedures.procedure_names()
+    return of_plan and "mounting" in task.tables.get("frame", {})
 
 
 def _run_and_show(
@@ -211,6 +223,7 @@ def _run_and_show(
     history = History(args.history or default_location())
     try:
         found, truth, others = _record_and_solve(args, task, folder, bounds, page)
+        tell_calculation(args)
         found = first_result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
         show_end_on_page(page, (), error)
@@ -237,14 +250,6 @@ def _run_and_show(
         error.printed = bool(args.json)
         raise
     return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
-
-
-def _names_no_device(args: argparse.Namespace) -> bool:
-    """Whether a run of a procedure has no option that states the device."""
-    from fieldcal import procedures
-
-    said = args.device or args.virtual is not None or args.resume
-    return not said and args.procedure in procedures.procedure_names()
 
 
 def _record_and_solve(

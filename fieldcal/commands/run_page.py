@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -21,6 +22,12 @@ LOCAL = "local"
 
 SCAN_WAIT_S = 60.0
 """How long the run waits for the code on the console to be scanned, s."""
+
+QUIET_ZONES = (4, 2, 1)
+"""Light modules around a code, the first that fits the terminal."""
+
+TOO_SMALL = "a code to scan does not fit this terminal: 38 by 20 characters are needed"
+"""What is shown in place of the code."""
 
 
 @contextlib.contextmanager
@@ -76,12 +83,32 @@ def _announce_page(server: PageServer, args: argparse.Namespace) -> None:
     sys.stderr.write(f"page: {server.address}\n")
     if args.plain or not sys.stderr.isatty():
         return
-    import segno
+    from fieldcal.commands.console import EscapingConsole
 
-    segno.make(server.address, error="l").terminal(sys.stderr, compact=True)
-    sys.stderr.write("scan it, or press Enter to go on without\n")
+    size = EscapingConsole(stderr=True).size
+    code = code_to_scan(server.address, size.width, size.height)
+    sys.stderr.write(code or f"{TOO_SMALL}\n")
+    what = "scan it" if code else "open the address"
+    sys.stderr.write(f"{what}, or press Enter to go on without\n")
     sys.stderr.flush()
     wait_for_page(server)
+
+
+def code_to_scan(address: str, columns: int, lines: int) -> str:
+    """QR code of an address, and below it room for a line; empty if it does not fit.
+
+    The quiet zone that the standard wants has four modules; on a small terminal fewer.
+    """
+    import segno
+
+    made = segno.make(address, error="l")
+    for border in QUIET_ZONES:
+        drawn = io.StringIO()
+        made.terminal(drawn, border=border, compact=True)
+        width, _ = made.symbol_size(border=border)
+        if width <= columns and drawn.getvalue().count("\n") + 2 <= lines:
+            return drawn.getvalue()
+    return ""
 
 
 def wait_for_page(server: PageServer) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.core.errors import DeviceError, FieldcalError
+from fieldcal.core.errors import DeviceError, FieldcalError, SessionInUse
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -21,8 +21,20 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import PlanTask
     from fieldcal.session.folder import Session
 
+CALCULATION = (
+    "the recording is complete, the device may be moved\ncalculating GO or NO-GO ..."
+)
+"""What is said until there is a result, which takes seconds."""
+
 UNTAKEN = "no position was taken, so the same command may begin again; "
 """What is said behind a run that broke off before it had anything to keep."""
+
+
+def tell_calculation(args: argparse.Namespace) -> None:
+    """Say that the recording is over, and what the wait is for, to a person."""
+    if not args.headless:
+        sys.stderr.write(f"{CALCULATION}\n")
+        sys.stderr.flush()
 
 
 def solve_and_decide(
@@ -131,6 +143,8 @@ def report_broken_run(
     from fieldcal.run.begun_before import has_taken_position
     from fieldcal.session.marks import MARKS
 
+    if isinstance(error, SessionInUse):  # who records there says how it goes on
+        return
     own = args.resume or args.records
     if not own or not os.path.exists(folder / MARKS):  # False where nobody may look
         return

@@ -86,15 +86,27 @@ def _task_to_resume(args: argparse.Namespace) -> tuple[PlanTask, Path]:
 
 
 def session_to_resume(folder: Path) -> Path:
-    """The session that was named, or the latest one in `SESSIONS`."""
+    """The session that was named, or the latest one in `SESSIONS`.
+
+    Raises
+    ------
+    InputError
+        If none was named, and none is there.
+
+    """
     from fieldcal.session.marks import MARKS
 
-    if folder != SESSIONS:
+    if folder != SESSIONS or (folder / MARKS).exists():
         return folder
     marks = max(
         folder.glob(f"*/{MARKS}"), key=lambda f: f.stat().st_mtime, default=None
     )
-    return marks.parent if marks else folder
+    if marks is None:
+        raise InputError(
+            f"no run is in {SESSIONS}, where runs without -o are recorded: name the"
+            " folder of the run, as in fieldcal run --resume FOLDER"
+        )
+    return marks.parent
 
 
 def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.keep_result import keep_result
 from fieldcal.commands.site import add_factory_options
 from fieldcal.core.errors import InputError
 from fieldcal.core.factory import FACTORY_KEYS
@@ -107,7 +108,6 @@ def run(args: argparse.Namespace) -> int:
     if over_time is not None:
         found = replace(found, info={**found.info, "over_time": over_time})
     found = _decide(args, found, session, still)
-    path = session.write_json(RESULT, found.to_json())
     if args.json:
         for warning in found.warnings:
             sys.stderr.write(f"fieldcal solve: {warning}\n")
@@ -117,6 +117,8 @@ def run(args: argparse.Namespace) -> int:
         show_lot_prior(found)
         show_over_time(found)
         show_decision(found)
+    path = keep_result(session, RESULT, found.to_json())
+    if not args.json:
         sys.stdout.write(f"written: {path}\n")
     go = found.info.get("decision", {}).get("go", True)
     return 0 if found.good and go else 1

@@ -50,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
         if said := broken_off(now, old, new):
             sys.stderr.write(f"{said}\n")
         for name, value in old.items():
-            sys.stdout.write(f"{name}: {now[name]:.9g} -> {value:.9g}\n")
+            unit = _offset_unit(name)
+            sys.stdout.write(f"{name}: {now[name]:.9g} -> {value:.9g}{unit}\n")
         confirm(f"give these {len(old)} parameters back to {device}", args.yes)
         note_done(path, done=False)  # from here on it may be interrupted
         back = now if whole(now, new) else {**now, **new}
@@ -62,3 +63,14 @@ def run(args: argparse.Namespace) -> int:
     note_done(path, undone=True)
     sys.stderr.write(f"given back and read back: {len(old)} parameters\n")
     return 0
+
+
+def _offset_unit(name: str) -> str:
+    """Unit of an offset of an autopilot, behind a space; empty for other parameters.
+
+    >>> [_offset_unit(n) for n in ("INS_ACCOFFS_X", "CAL_GYRO0_XOFF", "INS_ACCSCAL_X")]
+    [' m/s²', ' rad/s', '']
+    """
+    if "OFF" not in name:
+        return ""
+    return " m/s²" if "ACC" in name else " rad/s"

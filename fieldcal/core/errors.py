@@ -3,6 +3,7 @@
 FieldcalError                2
 +-- InputError               2  what the user gave cannot be used
 |    +-- SessionError        2  a session folder: names file, place and remedy
+|    |    +-- SessionInUse   2  another run records into it
 |    +-- PlanError           2  a plan, refused before anything moves
 |    +-- NotObservable       2  the positions cannot determine what was asked for
 +-- DeviceError              3  the link to the device failed
@@ -45,6 +46,10 @@ class InputError(FieldcalError):
 
 class SessionError(InputError):
     """A session folder cannot be read or written."""
+
+
+class SessionInUse(SessionError):
+    """Another run records into a session folder."""
 
 
 class PlanError(InputError):

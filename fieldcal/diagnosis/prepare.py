@@ -32,6 +32,7 @@ from fieldcal.physics.effect import Chain, Line, Scatter
 from fieldcal.physics.recording import Fault
 from fieldcal.session.description import Description
 from fieldcal.session.duplicate_channels import refuse_duplicate_channels
+from fieldcal.session.mixed_devices import refuse_mixed_devices
 
 MIN_WINDOW_SAMPLES = 20
 """Fewest samples of a window that is used."""
@@ -66,13 +67,14 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     Raises
     ------
     InputError
-        If no window holds enough samples.
+        If no window holds enough samples, or the samples are of two devices.
 
     """
     if about.means_only:
         return _prepared_means(block, about.in_time_order())
     _refuse_empty(block, about)
     refuse_duplicate_channels(block)
+    refuse_mixed_devices(block, about.windows)
     about = about.in_time_order()
     about.refuse_overlap()
     known = known_terms(about.model)

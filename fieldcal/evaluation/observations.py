@@ -28,6 +28,7 @@ from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 from fieldcal.session.folder import Session
+from fieldcal.session.mixed_devices import refuse_mixed_devices
 from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, LearnedNoise
 from fieldcal.windows.dead_axis import DeadSensor, dead_sensors, without_dead_axes
@@ -129,7 +130,7 @@ def usable_windows(session: Session) -> UsableWindows:
     SessionError
         If it has no position, or no window of any position can be used.
     InputError
-        If windows overlap, or a channel is another's copy.
+        If windows overlap, a channel is another's copy, or samples are of two devices.
 
     """
     if not session.positions:
@@ -141,6 +142,7 @@ def usable_windows(session: Session) -> UsableWindows:
     if session.about.means_only:
         return _windows_of_means(session)
     refuse_duplicate_channels(session.block)
+    refuse_mixed_devices(session.block, session.about.windows)
     dead, warnings = dead_sensors(session.block.six), list(session.warnings)
     taken = _average_windows(session, _without_dead_axes(session.block), warnings)
     if not taken:

@@ -86,6 +86,11 @@ def read_solution(path: Path) -> NavigationSolution:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
             rows = [(reader.line_num, row) for row in reader if row]
+    except FileNotFoundError as error:
+        raise InputError(
+            f"{path}: is not there: put what the navigator computed into it, or name"
+            " its file in session.toml, [navigator] solution"
+        ) from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
     heading = [name.strip() for name in rows[0][1]] if rows else []

@@ -32,6 +32,7 @@ from fieldcal.run.interruptions import (
     restart_notice,
 )
 from fieldcal.run.link_marks import MarkedRecorder
+from fieldcal.run.mixed_devices_watch import MixedDevicesWatch
 from fieldcal.run.operator.desk import (
     OperatorDesk,
     confirmation_question,
@@ -104,7 +105,8 @@ class Engine:
         self._before: int | None = None
         self._restarts = driver.health.restarts
         self._units = GyroUnitWatch(about.gravity)
-        self._warned_of_unit: int | None = None
+        self._mixed = MixedDevicesWatch()
+        self._warned = set[tuple[int, str]]()
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver, self._left_out)
         self._incoming = IncomingSamples(
@@ -230,8 +232,8 @@ class Engine:
                 average = self._windows.average(hold, pieces)
                 if average is not None:
                     self._warn_if_warming_up()
-                    self._warned_of_unit = None  # what was said of a turn is gone
-                    self._warn_of_unit(hold)
+                    self._warned.clear()  # what was said of a turn is gone
+                    self._warn_of_samples(hold)
                 return average
             except WindowDisturbed as disturbed:
                 moved, kept = disturbed.moved, disturbed.kept
@@ -250,6 +252,7 @@ class Engine:
     def _on_piece(self, piece: Block) -> None:
         """Look at a short stretch of samples, however long the block that it is of."""
         self._units.add(piece)
+        self._mixed.add(piece)
         if self._warm_up:
             self._warm_up.add(piece)
 
@@ -296,7 +299,7 @@ class Engine:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.notice)
             self._display.show_turning(hold, waiting, reason)
             shown = reason.state
-            self._warn_of_unit(hold)
+            self._warn_of_samples(hold)
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
                 self._desk.alarm(reason)
@@ -305,11 +308,12 @@ class Engine:
             self._report_wrong_place(hold, waiting, quiet=wish == "wait")
         raise AssertionError("blocks() ends in an exception only")
 
-    def _warn_of_unit(self, hold: Hold) -> None:
-        """Say once a position that the gyroscopes are in another unit."""
-        if self._units.notice and self._warned_of_unit != hold.index:
-            self._warned_of_unit = hold.index
-            self._desk.tell(self._units.notice)
+    def _warn_of_samples(self, hold: Hold) -> None:
+        """Say once a position what is wrong with the samples: a unit, two devices."""
+        for notice in (self._units.notice, self._mixed.notice):
+            if notice and (hold.index, notice) not in self._warned:
+                self._warned.add((hold.index, notice))
+                self._desk.tell(notice)
 
     def _report_wrong_place(
         self, hold: Hold, waiting: PositionWait, quiet: bool

@@ -21,10 +21,17 @@ from fieldcal.acceptance.verification import planned_verification
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, PlanError
 from fieldcal.core.positions import Position, specific_forces
-from fieldcal.session import description, schemas
+from fieldcal.session import description
 from fieldcal.session.description import Description
 from fieldcal.session.position_tables import position_table
-from fieldcal.session.schemas import make_validator, schema_fault
+from fieldcal.session.schemas import (
+    load_schema,
+    make_validator,
+    misspelt_keys,
+    schema_faults,
+    told_together,
+    validator,
+)
 
 SECONDS, WARM_UP, TURN = 30.0, 300.0, 120.0
 """Averaging time, longest wait for a device that warms up, longest turn, s."""
@@ -88,7 +95,7 @@ class PlanTask:
 @cache
 def plan_schema() -> dict[str, Any]:
     """Return the JSON Schema of a plan, with the procedures that there are."""
-    found = schemas.load_schema("plan")
+    found = load_schema("plan")
     procedure = found["properties"]["run"]["properties"]["procedure"]
     procedure["enum"] = list(procedures.procedure_names())
     procedure["description"] = f"write one of {', '.join(procedures.procedure_names())}"
@@ -152,7 +159,12 @@ def task_from_tables(tables: Mapping[str, Any], name: str) -> PlanTask:
 
 
 def _check_schema(tables: Mapping[str, Any], name: str) -> None:
-    if wrong := schema_fault({"run": {}, **tables}, make_validator(plan_schema())):
+    """Refuse what the schemas of a plan and of a session do not allow, all at once."""
+    whole, plan, session = {"run": {}, **tables}, plan_schema(), load_schema("session")
+    faults = schema_faults(whole, make_validator(plan))
+    faults += schema_faults(whole, validator("session"))
+    faults += misspelt_keys(whole, plan, session)
+    if wrong := told_together(list(dict.fromkeys(faults))):
         raise PlanError(f"{name}: {wrong}")
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
@@ -125,6 +126,14 @@ async def _describe(_: Request) -> Response:
     return JSONResponse(openapi.openapi_document())
 
 
+async def _explain_unknown_request(_: Request, error: Exception) -> Response:
+    status = error.status_code if isinstance(error, HTTPException) else 500
+    return _error_response(
+        status,
+        f"there is no such path or request; {openapi.DESCRIPTION_PATH} lists them",
+    )
+
+
 def _file_route(path: Path) -> Route:
     async def given(_: Request) -> Response:
         return FileResponse(path)
@@ -152,7 +161,8 @@ def create_app(jobs: JobStore, queue: JobQueue) -> Starlette:
             Route(openapi.DOCUMENT_PATH, api.get_document),
             *(_file_route(path) for path in sorted(FILES.iterdir())),
             _file_route(page.FILES / "page.css"),
-        ]
+        ],
+        exception_handlers={HTTPException: _explain_unknown_request},
     )
 
 

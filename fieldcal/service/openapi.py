@@ -73,7 +73,8 @@ def _upload_operation(job: dict[str, Any]) -> dict[str, Any]:
         "responses": {
             "202": _answer("Taken in; it waits.", job),
             "400": _answer("A name or an option is none."),
-            "413": _answer("It is too large, or its length is not said."),
+            "411": _answer("Its length is not said."),
+            "413": _answer("It is too large."),
             "429": _answer("Too many wait already."),
             "507": _answer("It cannot be kept: the disk is full."),
         },

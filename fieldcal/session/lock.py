@@ -16,7 +16,7 @@ from time import time
 
 from filelock import FileLock, Timeout
 
-from fieldcal.core.errors import SessionError
+from fieldcal.core.errors import SessionInUse
 
 LOCK, OWNER = ".lock", ".owner"
 
@@ -30,7 +30,7 @@ class SessionLock:
 
     Raises
     ------
-    SessionError
+    SessionInUse
         If another process holds it; the text states which, and since when.
     OSError
         If the folder cannot be written.
@@ -44,7 +44,7 @@ class SessionLock:
         try:
             self._lock.acquire(blocking=False)
         except Timeout as error:
-            raise SessionError(
+            raise SessionInUse(
                 f"{folder}: {_holder(self._owner)} records into it: end that run first,"
                 " or name another folder"
             ) from error

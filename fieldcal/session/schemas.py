@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -42,8 +43,15 @@ def _is_number(_: Any, value: Any) -> bool:
     return abs(value) <= sys.float_info.max
 
 
+MOST_TOLD = 9
+"""Most faults of a document that are told at once."""
+
+NEARLY = 0.7
+"""Similarity from which a key is taken for a misspelt one."""
+
+
 def schema_fault(tables: Mapping[str, Any], checked_by: Any) -> str:
-    """Fault of a document, with key and remedy; empty if it is valid.
+    """Faults of a document, each with key and remedy; empty if it is valid.
 
     Parameters
     ----------
@@ -51,11 +59,67 @@ def schema_fault(tables: Mapping[str, Any], checked_by: Any) -> str:
     checked_by : a `validator`
 
     """
-    from jsonschema.exceptions import best_match
+    return told_together(schema_faults(tables, checked_by))
 
-    error = best_match(checked_by.iter_errors(tables))
-    if error is None:
-        return ""
+
+def schema_faults(tables: Mapping[str, Any], checked_by: Any) -> list[str]:
+    """A sentence for each fault of a document, the most general first.
+
+    Parameters are those of `schema_fault`.
+    """
+    from jsonschema.exceptions import best_match, relevance
+
+    errors = sorted(checked_by.iter_errors(tables), key=relevance, reverse=True)
+    # of what fits none of several forms, the form that comes nearest
+    return list(dict.fromkeys(_sentence(best_match([error])) for error in errors))
+
+
+def told_together(faults: Sequence[str]) -> str:
+    """All faults in one: who mends a file mends them together.
+
+    >>> told_together(["a: b", "c: d"])
+    'a: b; and c: d'
+    """
+    told = list(faults[:MOST_TOLD])
+    if more := len(faults) - len(told):
+        told.append(f"{more} more")
+    return "; and ".join(told)
+
+
+def misspelt_keys(tables: Mapping[str, Any], *schemas: Mapping[str, Any]) -> list[str]:
+    """A sentence for each unknown key that is nearly a known one.
+
+    Unknown keys are the user's own, and are kept. One that is nearly known is a fault
+    that would go unnoticed: what it states would not be used.
+    """
+    known: dict[str, Any] = {}
+    for schema in schemas:
+        known |= schema.get("properties", {})
+    found = _misspelt(tables, known, [])
+    for name, inner in tables.items():
+        form = known.get(name, {})
+        many = isinstance(inner, list)
+        names = form.get("items", form).get("properties", {})
+        for number, table in enumerate(inner if many else [inner]):
+            if names and isinstance(table, Mapping):
+                found += _misspelt(table, names, [name, number] if many else [name])
+    return found
+
+
+def _misspelt(
+    table: Mapping[str, Any], known: Mapping[str, Any], path: list[str | int]
+) -> list[str]:
+    found = []
+    for key in table:
+        near = [name for name in known if name.startswith(f"{key}_")]  # lacks its unit
+        near += get_close_matches(key, known, 1, NEARLY)
+        if near and key not in known:
+            found.append(f"{_key([*path, key])} is not known: write {near[0]}")
+    return found
+
+
+def _sentence(error: Any) -> str:
+    """Fault that a validator found, with key and remedy."""
     path, needed = list(error.absolute_path), error.validator_value
     remedy = str(error.schema.get("description", "mend it"))
     match error.validator:

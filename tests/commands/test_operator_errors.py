@@ -25,6 +25,7 @@ from fieldcal.cli import main
 from fieldcal.core.errors import SessionError
 from fieldcal.drivers.driver import Driver, open_driver
 from fieldcal.run.movers import VirtualMover
+from fieldcal.run.plan_file import default_positions
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 
@@ -33,12 +34,13 @@ def failed(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """The sentence that a run ends with."""
     run = ["run", "two_position", "--headless", "--device", url, "-o", str(folder)]
     assert main([*run, "--patience", "0"]) == 3
-    *before, last = capsys.readouterr().err.strip().splitlines()
+    events = [json.loads(line) for line in capsys.readouterr().err.splitlines()]
+    *before, last = events
     if folder.exists():
-        assert "--resume" in before[-2]
-        assert "with --device if its port is another now" in before[-2]
-    said = last.removeprefix("fieldcal run: ")
-    assert said != last and not re.search(r"\.\s|[\[{<]|Error", said)
+        assert "--resume" in before[-1]["text"]
+        assert "with --device if its port is another now" in before[-1]["text"]
+    said = str(last["error"])
+    assert not re.search(r"\.\s|[\[{<]|Error", said)
     return said
 
 
@@ -110,8 +112,9 @@ def test_the_same_command_once_more_leaves_the_run_that_goes_on_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """In a second terminal, before the first run has heard a sample."""
-    folder = tmp_path / "s"
-    with Recorder(folder, {"grade": "tactical"}) as recorder:
+    folder, held = tmp_path / "s", default_positions("two_position")
+    about = {"run": {"procedure": "two_position"}, "position": held}
+    with Recorder(folder, about) as recorder:
         recorder.mark("asked", position=0)
         there = sorted(folder.iterdir())
         with VirtualMover(["--serial", "witmotion"], once=False) as device:
@@ -121,6 +124,11 @@ def test_the_same_command_once_more_leaves_the_run_that_goes_on_alone(
                              "--device", url, "-o", str(folder)]) in (2, 3)  # fmt: skip
                 assert "to go on" not in capsys.readouterr().err
                 assert sorted(folder.iterdir()) == there
+            url = f"serial:{device.port}?format=witmotion"
+            assert main(["run", "--resume", str(folder), "--device", url]) == 2
+            said = capsys.readouterr().err
+            assert "records into it: end that run first" in said
+            assert "to go on" not in said and "is kept in" not in said
     file = tmp_path / "file"
     file.write_text("mine")
     with pytest.raises(SessionError, match="is no folder; name one"):
@@ -209,3 +217,22 @@ def test_half_a_frame_at_the_end(
     assert said.endswith("hung up: check cable and power, then start again")
     block = Session.open(tmp_path / "s").block
     np.testing.assert_allclose(block.six, stream.samples.six[:-1], rtol=1e-6)
+
+
+def test_a_text_in_place_of_a_calibration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = tmp_path / "notes.txt"
+    text.write_text("hello\n")
+    assert main(["compare", str(text), str(text)]) == 2
+    said = capsys.readouterr().err
+    assert "notes.txt: is no calibration" in said and "session that was solved" in said
+
+
+def test_to_go_on_with_the_last_run_where_there_is_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "--resume"]) == 2
+    said = capsys.readouterr().err
+    assert "no run is in sessions" in said and "--resume FOLDER" in said

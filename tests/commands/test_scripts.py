@@ -13,6 +13,8 @@ from session_folders import places, recorded, write_session
 
 from fieldcal.cli import COMMANDS, main
 from fieldcal.commands import run
+from fieldcal.run.operator.event_lines import lines_as_events
+from fieldcal.run.operator.script import report_event
 from fieldcal.sim_device.profile import Profile
 
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
@@ -85,13 +87,38 @@ def test_events_have_a_time_and_an_end(
     call = ["run", "two_position", "--device", url, "--headless", "--patience", "0"]
     code = main([*call, "-o", str(tmp_path / "r"), "--no-report"])
     told = capsys.readouterr().err.splitlines()
-    events = [json.loads(line) for line in told if line.startswith("{")]
+    events = [json.loads(line) for line in told]
     times = [event["host_s"] for event in events]
     assert len(events) > 3 and times == sorted(times) and times[0] > 1.6e9
     assert events[-1]["event"] == "end" and events[-1]["exit_code"] == code
     assert [e["event"] for e in events].count("end") == 1
-    error = events[-1]["error"]
-    assert code not in (0, 1) or error is None or f"fieldcal run: {error}" in told
+    assert code in (0, 1) or events[-1]["error"]
+
+
+def test_an_option_that_is_not_there_is_an_event_as_well(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["run", "two_position", "--headless", "--bogus", "--json"]) == 2
+    out, err = capsys.readouterr()
+    (end,) = (json.loads(line) for line in err.splitlines())
+    assert end["event"] == "end" and end["exit_code"] == 2
+    assert "--bogus" in end["error"] and json.loads(out)["error"] == end["error"]
+
+
+def test_lines_of_others_become_events_and_events_stay(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with lines_as_events():
+        sys.stderr.write("first\n\nsec")
+        sys.stderr.write("ond\n")
+        report_event("place", position=1)
+        sys.stderr.write("no end")
+    sys.stderr.write("behind\n")
+    *lines, last = capsys.readouterr().err.splitlines()
+    events = [json.loads(line) for line in lines]
+    told = [event.get("text", event["event"]) for event in events]
+    assert told == ["first", "second", "place", "no end"]
+    assert all(event["host_s"] > 1.6e9 for event in events) and last == "behind"
 
 
 def test_the_last_event_has_the_exit_code_of_what_nobody_foresaw(
@@ -107,10 +134,9 @@ def test_the_last_event_has_the_exit_code_of_what_nobody_foresaw(
     url = f"replay:{session}/samples.parquet?speed=max"
     call = ["run", "two_position", "--device", url, "--headless"]
     assert main([*call, "-o", str(tmp_path / "r")]) == 70
-    told = [line for line in capsys.readouterr().err.splitlines() if line[:1] == "{"]
-    end = json.loads(told[-1])
+    end = json.loads(capsys.readouterr().err.splitlines()[-1])
     assert end["event"] == "end" and end["exit_code"] == 70
-    assert "ZeroDivisionError" in end["error"]
+    assert "ZeroDivisionError" in end["error"] and "send in" in end["error"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh"])

@@ -181,7 +181,7 @@ def test_what_a_killed_run_left_out_can_be_given_back(
         run.wait()
         np.testing.assert_array_equal(installed(url).vector("acc_offset"), 0)
         assert main(["undo", str(folder), "--yes"]) == 0
-        assert "INS_ACCOFFS_X: 0 -> 0.5" in capsys.readouterr().out
+        assert "INS_ACCOFFS_X: 0 -> 0.5 m/s²" in capsys.readouterr().out
         again = installed(url)
         np.testing.assert_allclose(again.vector("acc_offset"), [0.5, 0, 0])
         assert again.values["INS_ACCSCAL_Y"] == pytest.approx(1.02)

@@ -249,6 +249,13 @@ def test_what_cannot_be_used_is_refused(
         )
 
 
+def test_a_solution_that_is_not_there_is_told_with_where_to_name_it(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(InputError, match=r"is not there: .*\[navigator\] solution"):
+        read_solution(tmp_path / "solution.csv")
+
+
 def test_a_solution_saved_by_a_spreadsheet_is_read(tmp_path: Path) -> None:
     """It begins with a byte order mark."""
     path = tmp_path / "solution.csv"

@@ -5,16 +5,19 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fieldcal.commands import ports
+from fieldcal.cli import main
+from fieldcal.commands import ports, run
 from fieldcal.commands.find_device import find_device
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, split_by_time
 from fieldcal.run.introduction import introduce_device, rate_unit_from_turn
 from fieldcal.run.movers import VirtualMover
+from fieldcal.run.plan_file import PlanTask
 
 N = 200
 
@@ -135,3 +138,43 @@ def test_none_and_too_many_are_questions(
     devices.clear()
     with pytest.raises(InputError, match="no serial port is plugged in: plug"):
         find_device(options())
+
+
+PLAN = """
+[run]
+procedure = "two_position"
+seconds = 2
+"""
+
+
+@pytest.mark.parametrize("mounting", ["", '\n[frame]\nmounting = ["+x", "+y", "+z"]\n'])
+def test_a_plan_without_a_device_finds_it_as_a_procedure_does(
+    devices: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    mounting: str,
+) -> None:
+    """What `fieldcal plan` writes names no device; its mounting is not overruled."""
+    ran: list[PlanTask] = []
+
+    def carry_out(_: object, __: Namespace, task: PlanTask, ___: Path) -> int:
+        ran.append(task)
+        return 0
+
+    monkeypatch.setattr(run, "_run_and_show", carry_out)
+    plan = tmp_path / "plan.toml"
+    plan.write_text(PLAN + mounting)
+    assert main(["run", str(plan), "--headless"]) == 0
+    (task,) = ran
+    assert str(task.run["device"]).startswith(f"serial:{devices[0]}?format=witmotion")
+    assert task.about.axes == (("+x", "+y", "+z") if mounting else ("+x", "-z", "+y"))
+
+
+def test_a_wrong_plan_is_refused_before_a_port_is_listened_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(ports, "serial_ports", lambda: pytest.fail("listened"))
+    plan = tmp_path / "plan.toml"
+    plan.write_text(PLAN.replace("= 2", "= 0"))
+    assert main(["run", str(plan)]) == 2
+    assert "[run] seconds" in capsys.readouterr().err

@@ -129,6 +129,55 @@ def test_a_wrong_plan_is_refused_with_file_key_and_remedy(
     assert str(error.value).startswith("p.toml: ") and says in str(error.value)
 
 
+def test_all_faults_of_a_plan_are_told_at_once() -> None:
+    wrong = {
+        **plan(seconds=0.5, device="serial", verify="yes"),
+        "site": {"latitude_deg": 500, "level": 0.01},
+    }
+    with pytest.raises(PlanError) as error:
+        plan_file.task_from_tables(wrong, "p.toml")
+    said = str(error.value).split("; and ")
+    assert len(said) == 5
+    for key in ("seconds = 0.5", 'device = "serial"', "verify", "latitude_deg = 500"):
+        assert sum(key in one for one in said) == 1
+    assert "[site] level is not known: write level_deg" in said
+
+
+def test_what_is_too_much_to_read_is_counted() -> None:
+    wrong = {
+        "run": {f"key{i}": 1 for i in range(3)},
+        "format": 2,
+        "position": [{}] * 12,
+    }
+    with pytest.raises(PlanError, match=r"; and \d more$"):
+        plan_file.task_from_tables(wrong, "p.toml")
+
+
+@pytest.mark.parametrize(
+    ("tables", "says"),
+    [
+        ({"positions": POSITIONS}, "positions is not known: write position"),
+        (
+            {"site": {"latitude": 50.0}},
+            "[site] latitude is not known: write latitude_d",
+        ),
+        (
+            {"position": [POSITIONS[0], {**POSITIONS[1], "beta": 1.0}]},
+            "[[position]] number 2 beta is not known: write beta_deg",
+        ),
+    ],
+)
+def test_a_misspelt_key_is_no_key_of_ones_own(
+    tables: dict[str, Any], says: str
+) -> None:
+    """A plan with [[positions]] was carried out at the positions of its procedure."""
+    with pytest.raises(PlanError) as error:
+        plan_file.task_from_tables({**plan(), **tables}, "p.toml")
+    assert says in str(error.value)
+    own = {**plan(), "notes": "mine", "site": {"town": "Kyiv"}}
+    assert plan_file.task_from_tables(own, "p.toml").about.raw["notes"] == "mine"
+
+
 ANYTHING = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
     lambda inner: (

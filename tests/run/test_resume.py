@@ -18,7 +18,7 @@ from fieldcal.commands import run
 from fieldcal.commands.decision_view import show_decision
 from fieldcal.commands.help import CommandParser
 from fieldcal.commands.run_task import make_task
-from fieldcal.core.errors import SessionError
+from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
 from fieldcal.run.resuming import open_for_resume, positions_left_out, recorded_averages
@@ -350,7 +350,7 @@ def test_without_a_name_the_last_run_is_gone_on_with(
     Path("sessions").mkdir()
     parser = CommandParser("")
     run.add_arguments(parser)
-    with pytest.raises(SessionError, match="sessions: is no session"):
+    with pytest.raises(InputError, match="no run is in sessions, where runs"):
         make_task(parser.parse_args(["--resume"]))
     for age, name in ((50, "z-by-hand"), (10, "2026-03-01"), (90, "2026-04-01")):
         recorded(Path("sessions") / name)

@@ -14,6 +14,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator import terminal
 from fieldcal.run.operator.keyboard import Keyboard
+from fieldcal.run.operator.protocol import Phase
 
 
 def test_leaving_out_is_asked_back() -> None:
@@ -157,3 +158,19 @@ def test_a_terminal_that_is_gone_has_no_keys_and_ends_nothing(hand: int) -> None
         os.close(hand)
         assert keyboard.pressed() is None
         assert not keyboard.has_keys
+
+
+@pytest.mark.parametrize(
+    ("phase", "named", "not_named"),
+    [("averaging", "r begin again", "Enter"), ("taken", "Ctrl-C", "Enter"),
+     ("silent", "q stop", "skip"), ("turning", "Enter confirm", "Ctrl-C")],
+)  # fmt: skip
+def test_only_keys_that_do_something_are_named(
+    phase: Phase, named: str, not_named: str
+) -> None:
+    for width, height in ((80, 24), (40, 15)):
+        operator = sized(width, height)
+        operator.show(view(phase))
+        last = screen(operator, width, height).strip().splitlines()[-2:]
+        foot = " ".join(last)
+        assert named.split()[0] in foot and not_named not in foot

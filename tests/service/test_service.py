@@ -272,6 +272,35 @@ def test_too_much_is_refused(served: Served) -> None:
         client.over(job["id"]) if client.ask(f"/api/sessions/{job['id']}") else None
 
 
+@pytest.mark.parametrize("method", ["POST", "PUT"])
+def test_a_body_in_pieces_has_to_say_its_length(served: Served, method: str) -> None:
+    link = HTTPConnection(served.service.access.hosts[0])
+    link.request(
+        method, "/api/sessions?filename=x", iter([b"in", b"pieces"]),
+        {"Authorization": f"Bearer {TOKEN}"}, encode_chunked=True,
+    )  # fmt: skip
+    answer = link.getresponse()
+    assert answer.status == 411
+    assert "say how long it is" in json.loads(answer.read())["error"]
+    link.close()
+    assert list(served.jobs.root.iterdir()) == []
+
+
+def test_whatever_a_program_does_wrong_it_is_answered_an_object(
+    served: Served,
+) -> None:
+    client, stranger = served.client, Client(served.client.base, "x" * 20)
+    large = {"Content-Length": str(BOUNDS.upload + 1)}
+    for answer, status, says in (
+        (client.ask("/api/nowhere"), 404, "openapi.json"),
+        (client.ask("/api/sessions", b"x", "PUT"), 405, "openapi.json"),
+        (client.ask("/api/sessions?filename=x", b"", headers=large), 413, "19 MiB"),
+        (stranger.ask("/api/sessions"), 403, "--tokens"),
+        (Client(client.base, "").ask("/api/sessions"), 403, "Bearer"),
+    ):
+        assert answer.status == status and says in answer.json["error"]
+
+
 def test_one_who_hangs_up_leaves_nothing(served: Served) -> None:
     host = served.service.access.hosts[0]
     link = HTTPConnection(host)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -58,6 +59,8 @@ def assert_refused(
     capsys.readouterr()
     assert main(list(call)) == 2
     last = capsys.readouterr().err.strip().splitlines()[-1]
+    if "--headless" in call:
+        last = f"fieldcal {call[0]}: {json.loads(last)['error']}"
     assert last.startswith(f"fieldcal {call[0]}: {stick}")
     assert "the disk is full: make room on it, or name another" in last
     assert {path.name for path in stick.iterdir()} - there == (

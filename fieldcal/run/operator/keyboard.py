@@ -18,7 +18,7 @@ import sys
 from contextlib import suppress
 from typing import Any, Protocol, Self
 
-from fieldcal.run.operator.protocol import Wish
+from fieldcal.run.operator.protocol import Phase, Wish
 
 KEYS: dict[str, Wish] = {
     "\r": "confirm",
@@ -29,7 +29,13 @@ KEYS: dict[str, Wish] = {
     "q": "stop",
 }
 
-HELP = "keys: Enter confirm · r repeat · s skip · q stop"
+HELP: dict[Phase, str] = {
+    "turning": "keys: Enter confirm · r repeat the last one · s skip · q stop",
+    "averaging": "keys: r begin again · s skip · q stop",
+    "taken": "keys: Ctrl-C stop",
+    "silent": "keys: q stop",
+}
+"""What keys do in each phase; a key that would do nothing is not named."""
 
 OTHER_KEYS = re.compile("\x1b(?:\\[[0-?]*[ -/]*[@-~]|O.|.)?", re.DOTALL)
 """Sequences of arrows, function keys and letters with Alt, which contain letters: F2
@@ -38,7 +44,12 @@ ends in a Q, F4 in an S."""
 UNFINISHED = re.compile("\x1b(?:\\[[0-?]*[ -/]*|O)?$")
 """Beginning of such a sequence whose end has not arrived: a slow link may divide it."""
 
-SHORT_HELP = "Enter ok · r again · s skip · q stop"
+SHORT_HELP: dict[Phase, str] = {
+    "turning": "Enter ok · r last · s skip · q stop",
+    "averaging": "r again · s skip · q stop",
+    "taken": "Ctrl-C stop",
+    "silent": "q stop",
+}
 """The same for a screen of 40 characters."""
 
 

@@ -20,6 +20,7 @@ from fieldcal.run.operator.content import RunContent
 from fieldcal.run.operator.instruction import TURN
 from fieldcal.run.operator.keyboard import HELP, SHORT_HELP
 from fieldcal.run.operator.letters import TerminalLetters
+from fieldcal.run.operator.protocol import Phase
 
 TALL = 32
 """Fewest lines with room for letters three lines tall."""
@@ -74,6 +75,12 @@ class Screen:
     def _has_all_letters(self) -> bool:
         return self._console.encoding.lower().startswith("utf")
 
+    @property
+    def _phase(self) -> Phase:
+        """What is waited for now; the turn as long as nothing is known of it."""
+        view, hold = self._content.view, self._content.hold
+        return view.phase if view and hold is view.hold else "turning"
+
     def _full_layout(self) -> RenderableType:
         """The full screen, in a frame."""
         view = self._content.view
@@ -85,7 +92,7 @@ class Screen:
         if view:
             below.append(widgets.link_state(view))
         if self._keys():
-            below.append(Text(HELP))
+            below.append(Text(HELP[self._phase]))
         rows = max(
             MIN_LISTED_POSITIONS,
             self._console.height - 2 - self._line_count(*above, *below),
@@ -129,7 +136,8 @@ class Screen:
         lines += [*self._sentences(room), taken]
         parts = Layout()
         parts.split_column(
-            Layout(Group(*lines), ratio=1), Layout(Text(SHORT_HELP), size=1)
+            Layout(Group(*lines), ratio=1),
+            Layout(Text(SHORT_HELP[self._phase]), size=1),
         )
         return parts
 

@@ -17,7 +17,12 @@ from dataclasses import dataclass, field
 from urllib.parse import parse_qs
 
 from starlette.requests import cookie_parser
-from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.responses import (
+    JSONResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+)
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 SCAN = "scan the code that the console shows, or open the address beside it"
@@ -25,6 +30,12 @@ SCAN = "scan the code that the console shows, or open the address beside it"
 
 MAX_BODY_BYTES = 1000
 """Largest body of a request, bytes."""
+
+MIB = 1 << 20
+"""Bytes of a MiB."""
+
+API_PATH = "/api/"
+"""Beginning of the paths that programs ask for."""
 
 HEADERS = {
     "content-security-policy": "default-src 'self'; frame-ancestors 'none'",
@@ -63,7 +74,7 @@ class Access:
         host = headers.get("host", "")
         if host not in self.hosts:
             return _refusal_response(
-                421, "this page is served under the address on the console"
+                scope, 421, "this page is served under the address on the console"
             )
         given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token")
         if given and scope["path"] == "/" and self._is_page_token(given[0]):
@@ -76,29 +87,24 @@ class Access:
         program = scheme.lower() == "bearer" and self._is_program_token(sent.strip())
         if scheme.lower() == "bearer" and not program:
             why = "this token is none of a program: fieldcal serve takes"
-            return _refusal_response(403, f"{why} those of its --tokens file")
+            return _refusal_response(scope, 403, f"{why} those of its --tokens file")
         kept = cookie_parser(headers.get("cookie", "")).get(cookie_name(host), "")
         if not program and not self._is_page_token(kept):
-            return _refusal_response(403, self.remedy)
+            return _refusal_response(scope, 403, self.remedy)
         if scope["method"] in ("GET", "HEAD"):
             return None
         here = {f"{s}://{name}" for name in self.hosts for s in ("http", "https")}
         if not program and headers.get("origin", "") not in here:
             return _refusal_response(
-                403, "what is wanted has to come from the page itself"
+                scope, 403, "what is wanted has to come from the page itself"
             )
         if scope["method"] == "DELETE":
             return None
         most = self.uploads.get(scope["path"])
         kind = headers.get("content-type", "")
         if most is None and not kind.startswith("application/json"):
-            return _refusal_response(415, "what is wanted comes as JSON")
-        length, most = headers.get("content-length", ""), most or MAX_BODY_BYTES
-        if not length.isdecimal() or len(length) > 15 or int(length) > most:
-            return _refusal_response(
-                413, f"at most {most} bytes, and how many has to be said"
-            )
-        return None
+            return _refusal_response(scope, 415, "what is wanted comes as JSON")
+        return _length_refusal(scope, headers, most or MAX_BODY_BYTES)
 
     def _is_page_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode(), self.token.encode())
@@ -134,7 +140,24 @@ class Gate:
         await answer(scope, receive, with_headers)  # type: ignore[arg-type]
 
 
-def _refusal_response(status: int, why: str) -> Response:
+def _length_refusal(
+    scope: Scope, headers: Mapping[str, str], most: int
+) -> Response | None:
+    """The answer to a body that is too large or of unknown length; None for others."""
+    length = headers.get("content-length", "")
+    if not length.isdecimal():
+        why = "say how long it is (Content-Length); it is not taken in pieces"
+        return _refusal_response(scope, 411, why)
+    if len(length) > 15 or int(length) > most:
+        kept = f"{most // MIB} MiB" if most >= MIB else f"{most} bytes"
+        return _refusal_response(scope, 413, f"it is too large: at most {kept}")
+    return None
+
+
+def _refusal_response(scope: Scope, status: int, why: str) -> Response:
+    """A sentence; for programs, which ask under `API_PATH`, in an object."""
+    if scope["path"].startswith(API_PATH):
+        return JSONResponse({"error": f"refused: {why}"}, status)
     return PlainTextResponse(f"refused: {why}\n", status)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import urllib.error
 import urllib.request
@@ -17,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from processes import HANGS, TWO_POSITION, steady
 
-from fieldcal.commands.run_page import parse_address, wait_for_page
+from fieldcal.commands.run_page import code_to_scan, parse_address, wait_for_page
 from fieldcal.core.errors import InputError, Stopped
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.planning.steps import Hold
@@ -276,3 +277,20 @@ def test_a_run_is_watched_to_its_end(tmp_path: Path) -> None:
     assert run.returncode == 0
     # what is shorter than the time between two views may not be among them
     assert "HOLD STILL" in words and words[-1] == "GO"
+
+
+@pytest.mark.parametrize(
+    ("columns", "lines", "fits"),
+    [(80, 24, True), (60, 20, True), (40, 15, False), (30, 40, False)],
+)
+def test_a_code_is_shown_whole_or_not_at_all(
+    columns: int, lines: int, fits: bool
+) -> None:
+    """Its top was scrolled off a small terminal, with the address above it."""
+    code = code_to_scan(
+        "http://192.168.100.100:54321/?token=R7kPVyqMSOFG6y27wY9lUg", columns, lines
+    )
+    rows = re.sub("\x1b[^m]*m", "", code).splitlines()
+    assert bool(rows) == fits
+    assert len(rows) + 2 <= lines or not fits
+    assert all(len(row) <= columns for row in rows)

@@ -1,0 +1,84 @@
+"""Samples of two devices on one port, under the same names: their mean is of neither.
+
+Each window shows how far they are apart. Two devices differ by the same in all windows,
+but for their scale factors. So a vibration of half the sampling rate, whose phase at
+the samples is another in each window, is not taken for a second device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import CHANNELS, Block
+from fieldcal.windows.alternation import CLEAR, TwoMeans, alternating_means
+
+MOST_SAMPLES = 500
+"""Samples of each window that are looked at."""
+
+FEWEST_WINDOWS = 2
+"""Windows by which two devices are told from a vibration."""
+
+SAME_WITHIN = 0.2
+"""Largest change of the difference from window to window, as a share of it: scale
+factors change it by some per cent of g, which is less than most biases differ by."""
+
+GIVE_EACH_A_PORT = (
+    "record one device only: give each a port, names or a frame of its own, or have one"
+    " of them send nothing"
+)
+"""What to do about two devices on one port."""
+
+
+def difference_text(means: TwoMeans) -> str:
+    """The clearest difference of each sensor, such as ``ax by 0.49 m/s²``."""
+    parts, clear = [], np.abs(means.apart) / means.noise
+    for first, unit in ((0, "m/s²"), (3, "rad/s")):
+        at = first + int(clear[first : first + 3].argmax())
+        if clear[at] > CLEAR:
+            parts.append(f"{CHANNELS[at]} by {abs(means.apart[at]):.2g} {unit}")
+    return " and ".join(parts)
+
+
+def refuse_mixed_devices(
+    block: Block, windows: Sequence[tuple[float, float] | None]
+) -> None:
+    """Refuse a recording in which the samples of two devices come by turns.
+
+    Parameters
+    ----------
+    block : samples of the session
+    windows : begin and end of each, s of device time; None where none was taken
+
+    Raises
+    ------
+    InputError
+        Saying by how much they differ.
+
+    """
+    found = []
+    for begin, end in filter(None, windows):
+        first, last = np.searchsorted(block.t, (begin, end))
+        few = slice(first, min(last, first + MOST_SAMPLES))
+        means = alternating_means(np.hstack([block.acc[few], block.gyr[few]]))
+        if means is None:
+            return
+        found.append(means)
+    if len(found) < FEWEST_WINDOWS or not _are_the_same(found):
+        return
+    raise InputError(
+        "the samples of two devices come by turns, under the same names, and differ in"
+        f" {difference_text(found[0])}: their mean is that of neither;"
+        f" {GIVE_EACH_A_PORT}"
+    )
+
+
+def _are_the_same(found: Sequence[TwoMeans]) -> bool:
+    """Whether the differences are the same in units of noise, up to the sign."""
+    noise = np.median([means.noise for means in found], axis=0)
+    apart = np.array([means.apart for means in found]) / noise
+    apart *= np.sign(apart @ apart[0])[:, None]
+    off = np.linalg.norm(apart - apart[0], axis=1)
+    return bool(off.max() <= SAME_WITHIN * np.linalg.norm(apart[0]))

@@ -12,6 +12,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior import probabilities
+from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
 from fieldcal.model.search.selection import Search
 
@@ -170,3 +171,24 @@ def test_a_time_constant_is_of_a_session_a_turn_or_a_joint(
     """An instant is none, and a coefficient has no shape."""
     group = replace(CAUSES["settling:acc"].variants[5], effect=catalogue()[name])
     assert probabilities._has_time_constant(group) == has
+
+
+def test_sets_near_the_best_are_varied_and_no_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The best among them; of nothing there is nothing to vary."""
+    search, best = drifting()
+    varied: list[tuple[Set, float]] = []
+    monkeypatch.setattr(
+        probabilities, "visit_variations", lambda _, *there: varied.append(there)
+    )
+    far = [s for s in search.sets.visited.values()
+           if s.score <= best.score - MAX_LOG_DISTANCE]  # fmt: skip
+    assert far and best.members
+    Posterior(search, best)
+    sets = [one for one, _ in varied]
+    assert best in sets and not any(one in far for one in sets)
+    assert {top for _, top in varied} == {best.score}
+    varied.clear()
+    Posterior(search, search.sets.evaluate(()))
+    assert varied == []

@@ -12,8 +12,10 @@ from small_sessions import LADDER, SD, Session, dictionary, ladder, nominal, row
 
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
+from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
@@ -386,6 +388,31 @@ def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
     assert found.score >= max(s.score for s in every) - 0.5
     assert found.score >= max(scores) - 1.0
     assert search._with_two_more(empty, np.inf) is empty, "none comes near"
+
+
+def test_the_score_of_a_pair_is_that_of_its_sizes() -> None:
+    """Evidence, density of both sizes, and the chance of both causes."""
+    search, empty = drawn(0)
+    density = np.log(priors.density())
+    seen = 0
+    for table in search.offers.tables(empty):
+        before = table.state
+        for pair in offered_pairs(search.sets, empty, table, -np.inf):
+            columns, sigma = [before.columns], [before.prior_sigma]
+            total = -before.score + table.score
+            for offer in (pair.first, pair.second):
+                group = offer.member[1]
+                columns.append(group.columns)
+                sigma.append(group.prior_sigma(float(priors.SIZES[offer.size])))
+                total += density[offer.size]
+            both = Eliminated.of(
+                before.rows, np.concatenate(columns), np.concatenate(sigma)
+            )
+            members = (pair.first.member, pair.second.member)
+            chance = search.sets.set_log_prior(members) - search.sets.set_log_prior(())
+            assert pair.score == pytest.approx(both.score + total + chance, abs=1e-6)
+            seen += pair.first.size != pair.second.size
+    assert seen > 5
 
 
 @pytest.mark.parametrize("seed", range(2))

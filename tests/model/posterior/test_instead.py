@@ -12,6 +12,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior import probabilities
+from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
 from fieldcal.model.search.selection import Search
 
@@ -182,7 +183,7 @@ def test_sets_near_the_best_are_varied_and_no_others(
         probabilities, "visit_variations", lambda _, *there: varied.append(there)
     )
     far = [s for s in search.sets.visited.values()
-           if s.score <= best.score - probabilities.MAX_LOG_DISTANCE]  # fmt: skip
+           if s.score <= best.score - MAX_LOG_DISTANCE]  # fmt: skip
     assert far and best.members
     Posterior(search, best)
     sets = [one for one, _ in varied]

@@ -332,10 +332,8 @@ def test_a_kernel_without_can_and_channels_that_are_not_there(
         (f"can:{tmp_path}/tty?interface=slcan&dbc=virtual", "no such port"),
     ):
         assert main([*command, "--device", url]) == 3
-        said = capsys.readouterr().err
-        event, sentence = said.splitlines()
-        assert json.loads(event)["exit_code"] == 3
-        assert re.search(says, sentence)
+        end = json.loads(capsys.readouterr().err.splitlines()[-1])
+        assert end["exit_code"] == 3 and re.search(says, end["error"])
     for number, says in (
         (97, "the kernel has no CAN"),
         (19, "no such CAN channel"),

@@ -100,7 +100,7 @@ class Run:
         said = []
         for line in self._process.stderr:
             said.append(line.strip())
-            told = json.loads(line) if line.startswith("{") else {}
+            told = json.loads(line)
             if told.get("event") == "place":
                 turned([self._device], *POSITIONS[told["position"]])
         out = self._process.stdout.read()
@@ -201,7 +201,7 @@ def test_a_link_that_loses_all_the_time_is_marked_now_and_then(tmp_path: Path) -
 def failed(
     device: VirtualMover, url: str, folder: Path, *faults: dict[str, float]
 ) -> tuple[int, str]:
-    """Exit code and last line of a run in whose midst faults happen."""
+    """Exit code and error of a run in whose midst faults happen."""
     run = subprocess.Popen(
         [*TWO_POSITION, "--device", url, "-o", str(folder), "--patience", "0"],
         stderr=subprocess.PIPE,
@@ -211,7 +211,7 @@ def failed(
     for fault in faults:
         device.ask(fault=fault)
     _, said = run.communicate()
-    return run.returncode, said.strip().splitlines()[-1]
+    return run.returncode, str(json.loads(said.splitlines()[-1])["error"])
 
 
 def kept(folder: Path, said: str) -> None:

@@ -59,6 +59,7 @@ class Search:
         if thorough:
             changes += [
                 self._with_two_more,
+                self._with_one_for_two,
                 self._without_function,
                 self._with_wider_cause,
                 self._with_usual_causes,
@@ -161,6 +162,24 @@ class Search:
                 tried.append(self._with_one_more(wider, best.score, best.sizes))
             best = max(tried, key=score_of)
         return best
+
+    def _with_one_for_two(self, current: Set) -> Set:
+        """The best set with one cause replaced, and without what is not needed then.
+
+        Beside a cause that is not there, another may stand for what it lacks: beside a
+        jump of a bias a wrong angle of the next position, where the device has slipped.
+        """
+        tried, level = [current], current.score - ALTERNATIVE_MARGIN
+        for i, (cause, _) in enumerate(current.members):
+            reduced = self.sets.without(current, i)
+            offers = self.offers.ranked(reduced, current.sizes)
+            for offer in offers[:EVALUATED_OFFERS]:
+                near = offer.score > offers[0].score - MAX_LOG_DISTANCE
+                if near and offer.member[0].key != cause.key:
+                    other = self.offers.accept(reduced, offer)
+                    if other.score > level:
+                        tried.append(drop_superfluous(self.sets, other.members))
+        return max(tried, key=score_of)
 
     def _with_wider_cause(self, current: Set) -> Set:
         """The best set with all parameters of one of its causes, and one cause more.

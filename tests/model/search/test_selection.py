@@ -15,8 +15,10 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.priors import SIZES
+from fieldcal.model.search.offer import Offer
 from fieldcal.model.search.pairs import pair_gains
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.variations import widen_outputs
@@ -328,3 +330,43 @@ def test_instead_of_a_function_two_causes_are_tried_beside_all_parameters_too(
     asked.clear()
     plain = search.sets.evaluate(((drift, part),))
     assert search._without_function(plain) is plain and not asked
+
+
+def test_one_cause_is_tried_in_place_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where neither another in its place nor its absence alone raises the weight."""
+    jump, aside, slip = "settling:acc", "angle_offset", "cross_coupling"
+    far, drift = "g_sensitivity", "bias_drift:gyr"
+    scores = {
+        (jump, aside): 0.0, (jump,): -7.0, (aside,): -90.0, (): -95.0,
+        (aside, slip): -0.7, (slip,): 6.0, (aside, far): -70.0,
+    }  # fmt: skip
+    search = SESSION.search(np.zeros((len(SESSION.dictionary.x), 6)))
+    empty, asked = search.sets.evaluate(()), set[frozenset[str]]()
+
+    def evaluated(members: Sequence[Member], sizes: object = None) -> Set:
+        asked.add(frozenset(c.key for c, _ in members))
+        known = {frozenset(keys): score for keys, score in scores.items()}
+        score = known.get(frozenset(c.key for c, _ in members), -99.0)
+        return replace(empty, members=tuple(members), score=score)
+
+    def without(whole: Set, i: int) -> Set:
+        return evaluated((*whole.members[:i], *whole.members[i + 1 :]))
+
+    def ranked(current: Set, sizes: object) -> list[Offer]:
+        # predicted with sizes that suit none of them
+        foretold = {jump: -80.0, slip: -81.0, drift: -94.0}
+        return [Offer(there(k), v, 0, empty.sizes.instability)
+                for k, v in foretold.items() if k not in current.keys]  # fmt: skip
+
+    monkeypatch.setattr(search.sets, "evaluate", evaluated)
+    monkeypatch.setattr(search.sets, "without", without)
+    monkeypatch.setattr(search.offers, "ranked", ranked)
+    monkeypatch.setattr(
+        search.offers, "accept", lambda now, one: evaluated((*now.members, one.member))
+    )
+    current = evaluated((there(jump), there(aside)))
+    assert search._with_one_replaced(current).score == current.score
+    found = search._with_one_for_two(current)
+    assert found.keys == {slip} and found.score == 6.0
+    assert not any(drift in keys for keys in asked)  # of no use beside the others
+    assert search._with_one_for_two(found) is found

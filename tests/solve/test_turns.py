@@ -448,7 +448,7 @@ def test_compare_and_apply_say_what_is_wrong(
     broken = tmp_path / "result.json"
     broken.write_text("{")
     assert main(["compare", str(broken), str(broken)]) == 2
-    assert "cannot be read" in capsys.readouterr().err
+    assert "is no calibration" in capsys.readouterr().err
     broken.write_text("{}")
     assert main(["compare", str(broken), str(broken)]) == 2
     assert "format is missing" in capsys.readouterr().err

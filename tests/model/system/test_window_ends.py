@@ -54,7 +54,9 @@ def test_a_base_that_is_knocked_goes_with_the_turn_from_the_row_at_its_end(
     """Only what turns the device does; a bias that jumps is taken off with its mean."""
     d, _, linear, found = read
     knocked = [c for c in d.causes if c.name == "base_step"]
-    columns = np.unique([g.columns for c in knocked for g in c.variants])
+    columns = np.unique(
+        np.concatenate([g.columns for c in knocked for g in c.variants])
+    )
     assert len(columns) and np.array_equal(found.turning, columns)
     values = RNG.normal(size=d.width)
     amid = 0

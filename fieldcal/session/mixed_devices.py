@@ -42,20 +42,15 @@ def difference_text(means: TwoMeans) -> str:
     return " and ".join(parts)
 
 
-def refuse_mixed_devices(
+def find_mixed_devices(
     block: Block, windows: Sequence[tuple[float, float] | None]
-) -> None:
-    """Refuse a recording in which the samples of two devices come by turns.
+) -> TwoMeans | None:
+    """What two devices differ by whose samples come by turns; None if it is one.
 
     Parameters
     ----------
     block : samples of the session
     windows : begin and end of each, s of device time; None where none was taken
-
-    Raises
-    ------
-    InputError
-        Saying by how much they differ.
 
     """
     found = []
@@ -64,15 +59,33 @@ def refuse_mixed_devices(
         few = slice(first, min(last, first + MOST_SAMPLES))
         means = alternating_means(np.hstack([block.acc[few], block.gyr[few]]))
         if means is None:
-            return
+            return None
         found.append(means)
     if len(found) < FEWEST_WINDOWS or not _are_the_same(found):
-        return
-    raise InputError(
-        "the samples of two devices come by turns, under the same names, and differ in"
-        f" {difference_text(found[0])}: their mean is that of neither;"
-        f" {GIVE_EACH_A_PORT}"
-    )
+        return None
+    return found[0]
+
+
+def refuse_mixed_devices(
+    block: Block, windows: Sequence[tuple[float, float] | None]
+) -> None:
+    """Refuse a recording in which the samples of two devices come by turns.
+
+    The parameters are those of `find_mixed_devices`.
+
+    Raises
+    ------
+    InputError
+        Saying by how much they differ.
+
+    """
+    means = find_mixed_devices(block, windows)
+    if means is not None:
+        raise InputError(
+            "the samples of two devices come by turns, under the same names, and differ"
+            f" in {difference_text(means)}: their mean is that of neither;"
+            f" {GIVE_EACH_A_PORT}"
+        )
 
 
 def _are_the_same(found: Sequence[TwoMeans]) -> bool:

@@ -5,7 +5,7 @@ import pytest
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.session.mixed_devices import refuse_mixed_devices
+from fieldcal.session.mixed_devices import find_mixed_devices, refuse_mixed_devices
 
 RATE, SECONDS, WINDOWS = 100.0, 20.0, 4
 APART = np.array([0.4, -0.3, 0.2, 0.01, 0.0, 0.0])
@@ -45,14 +45,17 @@ def test_two_devices_are_refused_and_told_by_how_much_they_differ() -> None:
 
 
 def test_a_hum_of_half_the_sampling_rate_is_no_second_device() -> None:
-    refuse_mixed_devices(*recording(hum_of_half_the_rate()))
+    assert find_mixed_devices(*recording(hum_of_half_the_rate())) is None
 
 
 def test_one_window_is_not_enough_to_tell_them() -> None:
     block, windows = recording(by_turns())
-    refuse_mixed_devices(block, windows[:1])
-    refuse_mixed_devices(block, [])
+    assert find_mixed_devices(block, windows[:1]) is None
+    assert find_mixed_devices(block, []) is None
+    assert find_mixed_devices(block, windows) is not None
 
 
 def test_one_device_passes() -> None:
-    refuse_mixed_devices(*recording(np.zeros((int(RATE * SECONDS * WINDOWS), 6))))
+    alone = np.zeros((int(RATE * SECONDS * WINDOWS), 6))
+    assert find_mixed_devices(*recording(alone)) is None
+    refuse_mixed_devices(*recording(alone))

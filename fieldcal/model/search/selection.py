@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set, Sets, is_function
 from fieldcal.model.evidence.sizing import Member, Sizes
+from fieldcal.model.search.offer import Offer
 from fieldcal.model.search.offered_pairs import OfferedPair, offered_pairs
 from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offers
 from fieldcal.model.search.variations import (
@@ -118,11 +119,8 @@ class Search:
         level = current.score if level is None else level
         offers = self.offers.ranked(current, other_sizes)
         tried = [current]
-        for offer in offers[:EVALUATED_OFFERS]:
-            if (
-                offer.score > level - PREDICTION_SLACK
-                and offer.score > offers[0].score - MAX_LOG_DISTANCE
-            ):
+        for offer in _leading(offers):
+            if offer.score > level - PREDICTION_SLACK:
                 tried.append(self.offers.accept(current, offer))
         return max(tried, key=score_of)
 
@@ -172,10 +170,8 @@ class Search:
         tried, level = [current], current.score - ALTERNATIVE_MARGIN
         for i, (cause, _) in enumerate(current.members):
             reduced = self.sets.without(current, i)
-            offers = self.offers.ranked(reduced, current.sizes)
-            for offer in offers[:EVALUATED_OFFERS]:
-                near = offer.score > offers[0].score - MAX_LOG_DISTANCE
-                if near and offer.member[0].key != cause.key:
+            for offer in _leading(self.offers.ranked(reduced, current.sizes)):
+                if offer.member[0].key != cause.key:
                     other = self.offers.accept(reduced, offer)
                     if other.score > level:
                         tried.append(drop_superfluous(self.sets, other.members))
@@ -241,3 +237,12 @@ class Search:
             two = self._with_two_more(complete, current.score)
             tried += [self._with_one_more(complete, current.score), two]
         return max(tried, key=score_of)
+
+
+def _leading(offers: Sequence[Offer]) -> list[Offer]:
+    """The best of ranked offers, as far as they are near the best one."""
+    return [
+        offer
+        for offer in offers[:EVALUATED_OFFERS]
+        if offer.score > offers[0].score - MAX_LOG_DISTANCE
+    ]

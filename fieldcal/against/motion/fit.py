@@ -191,10 +191,13 @@ class MotionFit:
         """Responses of both triads to the motion; the same object if they are equal."""
         lag, rows = there.lag, self.rows
         acc, gyr = (lag.acc, lag.acc_second), (lag.gyr, lag.gyr_second)
-        first = rows.acc.step_towards(rows.reference, 0.0, *acc, free)
         if not lag.delay and acc == gyr:
-            return first, first
-        return first, rows.gyr.step_towards(rows.reference, lag.delay, *gyr, free)
+            both = rows.acc.step_towards(rows.reference, 0.0, *acc, free)
+            return both, both
+        return (
+            rows.acc.step_towards(rows.reference, 0.0, *acc, free, range(3)),
+            rows.gyr.step_towards(rows.reference, lag.delay, *gyr, free, range(3, 6)),
+        )
 
     def _unseen(self, found: Set) -> Array:
         """Correction of gravity along an axis that the reference lacks, (6,)."""

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct, idct
+from scipy.fft import dct, idct, prev_fast_len
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index
@@ -175,8 +175,8 @@ class MotionRows:
         return Experience(
             alpha=unknown, beta=unknown, gamma=np.zeros(n),
             f=v[:, ACC], w=v[:, GYR], w_dot=self.motion(response, 1)[:, GYR],
-            slope=self._means_of(response.slope, response.late, 0),
-            bend=self._means_of(response.bend, response.late, 0),
+            slope=self._own_means([r.slope for r in self._responses]),
+            bend=self._own_means([r.bend for r in self._responses]),
             missed=missed,
             f_bend=self.motion(response, 2)[:, ACC],
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
@@ -188,6 +188,19 @@ class MotionRows:
             gravity_sigma=0.0, attitude_sigma=unknown, transport=np.zeros(3),
             alpha_axis=np.full((n, 3), np.nan),
         )  # fmt: skip
+
+    @property
+    def _responses(self) -> tuple[Response, ...]:
+        """Those of the two triads, or the one of both."""
+        return (self.acc,) if self.gyr is self.acc else (self.acc, self.gyr)
+
+    def _own_means(self, references: Sequence[Reference]) -> Array:
+        """Means of what belongs to each of the responses, in its own channels."""
+        means = [
+            self._means_of(reference, response.late, 0)
+            for reference, response in zip(references, self._responses, strict=True)
+        ]
+        return np.hstack([means[0][:, ACC], means[-1][:, GYR]])
 
     @property
     def _turn(self) -> Array:
@@ -269,6 +282,7 @@ def rows_in_motion(
     step = float(np.median(np.diff(block.t)))
     broken = (np.diff(block.t[kept]) > GAP_INTERVALS * step) | (np.diff(kept) > 1)
     length = max(int(stretch_s / step / per_row), 1)
+    length = prev_fast_len(length, real=True)  # a prime one costs five times as much
     stretches = [
         run[: len(run) // (per_row * length) * per_row * length]
         for run in np.split(kept, np.flatnonzero(broken) + 1)

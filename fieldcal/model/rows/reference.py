@@ -7,7 +7,7 @@ the reference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from copy import copy
 from typing import Self
 
@@ -79,6 +79,17 @@ class Reference:
         """The reference after a filter is applied to each spline."""
         out = copy(self)
         out.splines = [(channels, sensor(spline)) for channels, spline in self.splines]
+        return out
+
+    def select_channels(self, channels: Collection[int]) -> Self:
+        """The reference of some of its channels alone; the others are 0."""
+        out = copy(self)
+        out.splines = []
+        for of, spline in self.splines:
+            kept = [c in channels for c in of.tolist()]
+            if any(kept):
+                some = PPoly.construct_fast(spline.c[..., kept], spline.x)
+                out.splines.append((of[kept], some))
         return out
 
     def averaged_over(self, offsets: Array, step: float) -> Self:

@@ -39,6 +39,10 @@ MIN_SECOND_ORDER_S = 0.015
 motion at w, 7e-4 of one at 1 Hz."""
 
 
+SIX = range(6)
+"""All channels."""
+
+
 @dataclass(frozen=True, slots=True)
 class Response:
     """Response of the sensors of a triad to the motion of a reference.
@@ -49,7 +53,9 @@ class Response:
     tau : time constant of the low-pass of first order, s
     second : time constant of the low-pass of second order, s
     sensed : the reference after both low-passes
-    slope, bend : decrease of `sensed` per second of `tau` and of `second`
+    slope, bend : decrease of `sensed` per second of `tau` and of `second`, of some
+        channels; that of others is not calculated
+    channels : these, of the six
 
     """
 
@@ -59,6 +65,7 @@ class Response:
     sensed: Reference
     slope: Reference
     bend: Reference
+    channels: range
 
     @classmethod
     def of(
@@ -67,6 +74,7 @@ class Response:
         late: float = 0.0,
         tau: float = 0.0,
         second: float = 0.0,
+        channels: range = SIX,
     ) -> Self:
         """Response to a reference with a delay and time constants."""
         sensed = reference
@@ -76,13 +84,15 @@ class Response:
             sensed = sensed.filtered_by(partial(second_order, tau=second))
         slope = partial(first_order_slope, tau=max(abs(tau), MIN_TIME_CONSTANT_S))
         bend = partial(second_order_slope, tau=max(abs(second), MIN_SECOND_ORDER_S))
+        own = sensed.select_channels(channels)
         return cls(
             late,
             tau,
             second,
             sensed,
-            sensed.filtered_by(slope),
-            sensed.filtered_by(bend),
+            own.filtered_by(slope),
+            own.filtered_by(bend),
+            channels,
         )
 
     def step_towards(
@@ -92,6 +102,7 @@ class Response:
         tau: float,
         second: float,
         free: bool = True,
+        channels: range = SIX,
     ) -> Self:
         """Response after a step towards an estimated delay and time constants, s.
 
@@ -102,9 +113,9 @@ class Response:
         if free:
             first, other = self._first_towards(tau), self._second_towards(second)
         late += tau - first + ROOT2 * (second - other)
-        if (first, other) == (self.tau, self.second):
+        if (first, other, channels) == (self.tau, self.second, self.channels):
             return replace(self, late=late)
-        return self.of(reference, late, first, other)
+        return self.of(reference, late, first, other, channels)
 
     def _first_towards(self, tau: float) -> float:
         if not tau:

@@ -131,7 +131,8 @@ class MotionSystem(System):
     ) -> LinearRows:
         """One channel's coefficients, whitened."""
         weight = 1 / np.sqrt(self.power[:, c])
-        design = np.hstack([table for _, table in parts]) * weight[:, None]
+        design = np.hstack([table for _, table in parts])
+        design *= weight[:, None]
         columns = np.concatenate([at for at, _ in parts])
         rows = np.arange(len(white))
         return LinearRows(

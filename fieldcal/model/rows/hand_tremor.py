@@ -30,7 +30,8 @@ they have single rows, and the accelerometers their blocks.
 Somebody may hold the device in some windows only, and lean it against something, put it
 down or into a fixture in the others. The noise of the sensors is the same in all of
 them: over a second, (2) without a hand varies by a few tenths, and a hand makes it some
-ten times as large. Angles that are known are then off by what the hand turns.
+ten times as large. Angles that are known are then off by what the hand turns. Windows
+without a hand keep their blocks: a jump or a knock within them is seen as it is.
 """
 
 from __future__ import annotations
@@ -42,7 +43,12 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import GYR, Array, Index
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.hand_drift import STEADY_HAND_K, drift_factor, force_turn_rate
+from fieldcal.model.rows.hand_drift import (
+    STEADY_HAND_K,
+    ForceTurn,
+    drift_factor,
+    force_turn_rate,
+)
 from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
@@ -74,7 +80,8 @@ def rows_of_recording(source: RowSource) -> Rows:
     """Rows of a recording, one for each window in which the device is held by hand."""
     rows = reduce_to_rows(source)
     held = np.unique(rows.x.position)
-    bound = window_bounds(source.block, source.about)[held]
+    windows = window_bounds(source.block, source.about)
+    bound = windows[held]
     block = masked(source.block, source.usable)
     six = block.six
     pieces = [six[a:b] for a, b in bound]
@@ -91,46 +98,66 @@ def rows_of_recording(source: RowSource) -> Rows:
     trembling = _trembling_windows(rows, pieces, source.rate)
     if not trembling.any():
         return rows
-    still = rows.without(np.isin(rows.x.position, held[trembling]))
+    shaky = np.isin(np.arange(len(windows)), held[trembling])
+    still = rows.without(shaky[rows.x.position])
     level = still.sd * np.sqrt(rows.length * source.rate)[:, None]
-    in_hand = reduce_to_rows(source, whole=True, level=median_sigma(level))
-    unsteady = _add_hand_motion(source, replace(in_hand, noise=rows.noise), 0.0)
-    return _add_angle_errors(source, unsteady, held[trembling])
+    in_hand = reduce_to_rows(source, whole=shaky, level=median_sigma(level))
+    at = np.flatnonzero(shaky[in_hand.x.position])
+    unsteady = _add_hand_motion(source, replace(in_hand, noise=rows.noise), 0.0, at)
+    return _add_angle_errors(source, unsteady, at)
 
 
-def _add_hand_motion(source: RowSource, rows: Rows, angle: float) -> Rows:
+def _add_hand_motion(
+    source: RowSource, rows: Rows, angle: float, held: Index | None = None
+) -> Rows:
     """Add the errors of the means by a hand's motion to rows of whole windows.
 
-    `angle` is the least rms angle by which it turns the force, rad.
+    Parameters
+    ----------
+    source, rows : the samples and their rows
+    angle : least rms angle by which the hand turns the force, rad
+    held : (k,) the rows of windows in a hand; all of them if None
+
     """
-    block = masked(source.block, source.usable)
+    held = np.arange(len(rows.x)) if held is None else held
+    turned, pushed, turns = _motion_in_hand(source, rows, held)
     nominal = source.about.nominal
     unit, rate_unit = (np.abs(nominal[name]) for name in ("acc_scale", "gyr_scale"))
-    turned, pushed, turns = np.zeros((len(rows.x), 3)), np.zeros(len(rows.x)), []
-    bound = window_bounds(source.block, source.about)[rows.x.position]
-    for i, (a, b) in enumerate(bound):
-        white, lasts = rows.sd[i], float(rows.length[i])
-        rates = block.gyr[a:b] / rate_unit
-        turned[i] = _tremor_rms(rates, lasts, white[3:] / rate_unit)
-        up = rows.x.f[i] / (np.linalg.norm(rows.x.f[i]) or np.nan)  # gyroscopes alone
-        force = block.acc[a:b] / unit
-        spread = np.array([np.linalg.norm(white[:3] / unit * up)])
-        pushed[i] = _tremor_rms((force @ up)[:, None], lasts, spread)[0]
-        turns.append(force_turn_rate(force, lasts))
-    sd, length = rows.sd.copy(), rows.length[:, None]
+    sd, length = rows.sd.copy(), rows.length[held]
     # an axis without information has the mean of the others
     known = np.isfinite(turned)
     square = np.where(known, turned, 0.0) ** 2
     trembles = square.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    k = drift_factor(turns, trembles / rows.length**2)
-    slow = np.sqrt(STEADY_HAND_K * angle**2 + k * turned**2) / length  # (1)
-    sd[:, 3:] = np.hypot(sd[:, 3:], slow * rate_unit)
-    fast = np.sqrt(STEADY_HAND_K) * pushed[:, None] / length * unit  # (1)
-    sd[:, :3] = np.hypot(sd[:, :3], fast)
+    k = drift_factor(turns, trembles / length**2)
+    slow = np.sqrt(STEADY_HAND_K * angle**2 + k * turned**2) / length[:, None]  # (1)
+    sd[held, 3:] = np.hypot(sd[held, 3:], slow * rate_unit)
+    fast = np.sqrt(STEADY_HAND_K) * (pushed / length)[:, None] * unit  # (1)
+    sd[held, :3] = np.hypot(sd[held, :3], fast)
     # difference between the angle at the end of a rest and the mean angle
-    some = np.where(known, square, trembles[:, None])
-    most = np.sqrt(np.maximum(angle**2, k / STEADY_HAND_K * some))
-    return replace(rows, sd=sd, hand_angle=most)
+    some, wander = np.where(known, square, trembles[:, None]), np.zeros_like(sd[:, 3:])
+    wander[held] = np.sqrt(np.maximum(angle**2, k / STEADY_HAND_K * some))
+    return replace(rows, sd=sd, hand_angle=wander)
+
+
+def _motion_in_hand(
+    source: RowSource, rows: Rows, held: Index
+) -> tuple[Array, Array, list[ForceTurn]]:
+    """Tremor about each axis (k, 3), rad, along the force (k,), m/s, and slow turns."""
+    block = masked(source.block, source.usable)
+    nominal = source.about.nominal
+    unit, rate_unit = (np.abs(nominal[name]) for name in ("acc_scale", "gyr_scale"))
+    turned, pushed, turns = np.zeros((len(held), 3)), np.zeros(len(held)), []
+    bound = window_bounds(source.block, source.about)[rows.x.position[held]]
+    for i, (row, (a, b)) in enumerate(zip(held.tolist(), bound, strict=True)):
+        white, lasts = rows.sd[row], float(rows.length[row])
+        rates = block.gyr[a:b] / rate_unit
+        turned[i] = _tremor_rms(rates, lasts, white[3:] / rate_unit)
+        size = np.linalg.norm(rows.x.f[row]) or np.nan  # of gyroscopes alone
+        up, force = rows.x.f[row] / size, block.acc[a:b] / unit
+        spread = np.array([np.linalg.norm(white[:3] / unit * up)])
+        pushed[i] = _tremor_rms((force @ up)[:, None], lasts, spread)[0]
+        turns.append(force_turn_rate(force, lasts))
+    return turned, pushed, turns
 
 
 def _separate_triads(source: RowSource, in_hand: Rows) -> Rows:
@@ -147,15 +174,13 @@ def _separate_triads(source: RowSource, in_hand: Rows) -> Rows:
     return replace(rows, sd=sd, noise=in_hand.noise, hand_angle=wander)
 
 
-def _add_angle_errors(source: RowSource, rows: Rows, shaky: Index) -> Rows:
-    """Add the angle errors by a hand in positions `shaky` whose angles are known."""
-    x, sd, wander = rows.x, rows.sd.copy(), rows.hand_angle.copy()
-    held = np.isin(x.position, shaky)
-    wander[x.oriented & ~held] = 0.0
-    for i in np.flatnonzero(x.oriented & held):
-        off = np.sqrt(np.diag(turned_force(x.f[i], wander[i])))
+def _add_angle_errors(source: RowSource, rows: Rows, held: Index) -> Rows:
+    """Add the angle errors by a hand in rows `held` whose angles are known."""
+    x, sd = rows.x, rows.sd.copy()
+    for i in held[x.oriented[held]]:
+        off = np.sqrt(np.diag(turned_force(x.f[i], rows.hand_angle[i])))
         sd[i, :3] = np.hypot(sd[i, :3], off * np.abs(source.about.nominal["acc_scale"]))
-    return replace(rows, sd=sd, hand_angle=wander)
+    return replace(rows, sd=sd)
 
 
 def turned_force(force: Array, angle: Array) -> Array:

@@ -135,7 +135,7 @@ class RowSource:
 
 def reduce_to_rows(
     source: RowSource,
-    whole: bool = False,
+    whole: bool | NDArray[np.bool_] = False,
     level: Array | None = None,
     apart: bool = False,
 ) -> Rows:
@@ -144,8 +144,10 @@ def reduce_to_rows(
     Parameters
     ----------
     source : samples and windows
-    whole : whether each window is one row, as of a device that is held by hand
-    level : (6,) standard deviation of one sample; if None, it is measured in windows
+    whole : whether a window is one row, as of a device that is held by hand, of each
+        position (p,) or of all
+    level : (6,) standard deviation of one sample in these; if None, it is measured in
+        each window, as in the others
     apart : whether the blocks are for the accelerometers only, and each window has a
         further row, its last, for the gyroscopes
 
@@ -171,17 +173,23 @@ class _CutWindows:
     ----------
     windows : (w, 2) first and one past the last sample of each window
     position : (w,) index of each window's position
+    whole : (w,) whether it is one row
     bounds : (r, 2) first and one past the last sample of the rows of each window
 
     """
 
     windows: NDArray[np.intp]
     position: NDArray[np.intp]
+    whole: NDArray[np.bool_]
     bounds: list[NDArray[np.intp]]
 
     @classmethod
     def of(
-        cls, source: RowSource, block: Block, whole: bool, apart: bool
+        cls,
+        source: RowSource,
+        block: Block,
+        whole: bool | NDArray[np.bool_],
+        apart: bool,
     ) -> _CutWindows:
         """Cut the windows of `block`, the source's samples that may be used.
 
@@ -190,13 +198,13 @@ class _CutWindows:
         windows = window_bounds(block, source.about)
         held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
         rate, without = source.rate, source.about.excluded_spans
-        bounds = []
-        for a, b in windows[held].tolist():
+        one, bounds = np.broadcast_to(whole, len(windows))[held], []
+        for (a, b), alone in zip(windows[held].tolist(), one.tolist(), strict=True):
             each = np.zeros((0, 2), dtype=np.intp)
-            if not whole:
+            if not alone:
                 each = block_bounds(block.t, (a, b), rate, len(held), without)
-            bounds.append(np.vstack([each, [(a, b)]]) if whole or apart else each)
-        return cls(windows[held], held, bounds)
+            bounds.append(np.vstack([each, [(a, b)]]) if alone or apart else each)
+        return cls(windows[held], held, one, bounds)
 
     @property
     def rows(self) -> list[int]:
@@ -207,15 +215,16 @@ class _CutWindows:
 def _average_windows(source: RowSource, cut: _CutWindows, level: Array | None) -> Rows:
     """Average the blocks of windows, with the noise that the samples have.
 
-    `level` (6,) is the standard deviation of one sample; if None, that of each window,
-    and at least that of a base that sways.
+    `level` (6,) is the standard deviation of one sample in windows that are one row;
+    if None, and in the others, that of each window, and at least that of a base that
+    sways.
     """
     shaken, rows = source.window_noise, cut.rows
     noise, levels = shaken.noise, shaken.levels
     if source.sway_noise is not None:
         noise, levels = (np.fmax(a, source.sway_noise) for a in (noise, levels))
     if level is not None:
-        noise, levels = level, np.tile(level, (len(cut.windows), 1))
+        noise, levels = level, np.where(cut.whole[:, None], level, levels)
     return average_rows(
         replace(source, block=shaken.block),
         np.concatenate(cut.bounds),

@@ -195,6 +195,14 @@ def test_a_long_delay_is_no_filter_of_either_triad() -> None:
     assert np.abs(pulls(one, found)).max() < 4.5
 
 
+def test_a_filter_that_is_nothing_beside_a_delay_is_tried_all_the_same() -> None:
+    """Linearised about no filter it explains less than a delay leaves."""
+    one, found, _ = compared(26, 34_800)
+    assert one.kind == "second_order"
+    assert {d.id for d in found.differences} - CALIBRATION == {"second_order"}
+    assert np.abs(pulls(one, found)).max() < 4.5
+
+
 @pytest.mark.thorough
 def test_a_mount_as_soft_along_every_axis_is_nearly_a_filter() -> None:
     """To second order it is the inverse of a low-pass, and a delay."""

@@ -145,12 +145,12 @@ def _correct_scores(
 def _likely_starts(fit: MotionFit, dictionary: MotionDictionary) -> list[_Start]:
     """Fits to begin a search with: with a filter or another effect of motion.
 
-    The effect of a filter is linear about a similar filter, but not about none. Among
-    the effects that show only in motion and that explain something, the likeliest is
-    taken, and those that come near it; those that explain most are tried first. An
-    effect other than a filter is skipped if it explains nothing beside the one just
-    tried. Filters of first and of second order are both tried always, since either
-    explains most of the other.
+    The effect of a filter is linear about a similar filter, but not about none, where
+    it may even seem to explain nothing beside a delay. So filters of first and of
+    second order are both tried always; of other effects that show only in motion,
+    those that explain something. The likeliest is taken, and those that come near it;
+    those that explain most are tried first. An effect other than a filter is skipped if
+    it explains nothing beside the one just tried.
     """
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
     delays = tuple(m for m in every if lag_of(m).delay)
@@ -161,7 +161,10 @@ def _likely_starts(fit: MotionFit, dictionary: MotionDictionary) -> list[_Start]
         for i, member in enumerate(every)
         if member[1].effect is not None
         and member[1].effect.while_moving
-        and (evidence := fit.evidence((*delays, member))) > nothing
+        and (
+            (evidence := fit.evidence((*delays, member))) > nothing
+            or lag_of(member) != Lag()
+        )
     }
     remain = sorted(explains, key=lambda i: -explains[i])
     while remain:

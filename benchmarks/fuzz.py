@@ -1,4 +1,4 @@
-"""A million frames, most of them spoilt, through each serial decoder."""
+"""Ten million frames, most of them spoilt, through the serial decoders."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from fieldcal.drivers.codec import open_codec, wire_formats
 from fieldcal.drivers.options import Options
 from fieldcal.sim_device.wire import open_wire
 
-FRAMES = 1_000_000
+FRAMES = 10_000_000 // len(wire_formats())
 BATCH = 2000
 SENT = {"text": "text?checksum=xor&digits=7"}
 READ = {"text": "checksum=xor&"} | TOLD

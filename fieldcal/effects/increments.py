@@ -1,23 +1,30 @@
 """Outputs are increments over an interval, in the axes at one of its ends.
 
-    U += s w x f,    W += c w x dw/dt
+    U += s w x f + c (f''/2 + w x f' - w' x f + 2 w x (w x f))
+    W += c (w''/2 + w x w')
 
-U, W outputs, f specific force and w angular rate, device axes. Velocity increments over
-an interval T in the axes at its start have s = T / 2, and in those at its end -T / 2,
-s; rotation vectors over T, into which coning is integrated, have c = T^2 / 12, s^2.
-Without it the output is the mean over the interval in the axes of each moment. With
-the other sign, the simulator's are such. Seen only where a reference follows the
-motion. Source: J. Bortz, A New Mathematical Formulation for Strapdown Inertial
-Navigation, 1971; P. Savage, Strapdown Inertial Navigation Integration Algorithm Design,
-1998.
+U, W outputs, f specific force and w angular rate in the middle of the interval, device
+axes; w', f'' and the like derivatives of their components. Over an interval T velocity
+increments in the axes at its start have s = T / 2, and those in the axes at its end
+-T / 2, s; c = T^2 / 12, s^2, is in the mean over T and in the rotation vector, into
+which coning is integrated. Where it is the reference that has increments, both signs
+are reversed, and the last of the terms, solved for f, is -w x (w x f).
+Seen only where a reference follows the motion. The equations are the expansion of
+
+    U = 1/T int R f dt,    W = 1/T (int w dt + 1/2 int (int w dt) x w dt)
+
+to the square of T. Source: J. Bortz, A New Mathematical Formulation for Strapdown
+Inertial Navigation, 1971; P. Savage, Strapdown Inertial Navigation Integration
+Algorithm Design, 1998.
 
 >>> import numpy as np
 >>> x = Experience.at_rest(
 ...     np.zeros(1), np.zeros(1), 9.8, rate=np.array([[0, 0, 2.0]]),
 ...     w_dot=np.array([[3.0, 0, 0]]),
 ... )
->>> Increments().design(x)[0, [0, 4]] + 0.0
+>>> Increments().design(x)[0, [0, 1, 4]] + 0.0
 array([[19.6,  0. ],
+       [ 0. , 78.4],
        [ 0. ,  6. ]])
 """
 
@@ -33,7 +40,7 @@ from fieldcal.physics.experience import Experience
 
 
 class Increments(Sensor):
-    """Sculling and coning terms of increments, which means do not have."""
+    """What increments have that the motion at an instant has not."""
 
     params = (Param("sculling", "s", 0.01), Param("coning", "s^2", 1e-4))
     while_moving = True
@@ -50,7 +57,18 @@ class Increments(Sensor):
         return bool(x.slope.any())
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """Rate across force, and across its own change."""
-        out = np.zeros((len(x), 6, 2))
-        out[:, ACC, 0], out[:, GYR, 1] = np.cross(x.w, x.f), np.cross(x.w, x.w_dot)
+        """Rate across force, and what goes as the square of the interval."""
+        out, across = np.zeros((len(x), 6, 2)), np.cross(x.w, x.f)
+        square = x.f_bend / 2 + np.cross(x.w, x.f_dot) - np.cross(x.w_dot, x.f)
+        out[:, ACC, 0], out[:, ACC, 1] = across, square + 2 * np.cross(x.w, across)
+        out[:, GYR, 1] = x.w_bend / 2 + np.cross(x.w, x.w_dot)
+        return out
+
+    def change_of_outputs(
+        self, x: Experience, values: Array, shape: Mapping[str, float] = NO_SHAPE
+    ) -> Array:
+        """Change of the outputs; of increments that the reference has, solved for f."""
+        out = super().change_of_outputs(x, values, shape)
+        if values[1] < 0:
+            out[:, ACC] -= 3 * values[1] * np.cross(x.w, np.cross(x.w, x.f))
         return out

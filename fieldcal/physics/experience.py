@@ -46,7 +46,9 @@ class Experience:
     bend : (n, 6) the same of a low-pass of second order
     missed : (n, 6) m/s^2 and rad/s, by how much f and w change in the time that stamps
         are off the even times of the samples; 0 where that is not known
-    f_bend : (n, 3) m/s^4, second derivative of f; 0 where that is not known
+    f_dot, f_bend : (n, 3) m/s^3 and m/s^4, first and second derivative of f, of its
+        components in device axes; 0 where they are not known
+    w_bend : (n, 3) rad/s^3, second derivative of w; 0 where that is not known
     t : (n,) s, device time
     lasts : (n,) s, what each row is a mean over; 0 for samples
     since_start : (n,) s since the session's start
@@ -80,7 +82,9 @@ class Experience:
     slope: Array
     bend: Array
     missed: Array
+    f_dot: Array
     f_bend: Array
+    w_bend: Array
     t: Array
     lasts: Array
     since_start: Array
@@ -125,7 +129,9 @@ class Experience:
             "slope": np.zeros((n, 6)),
             "bend": np.zeros((n, 6)),
             "missed": np.zeros((n, 6)),
+            "f_dot": np.zeros((n, 3)),
             "f_bend": np.zeros((n, 3)),
+            "w_bend": np.zeros((n, 3)),
             "t": np.arange(n, dtype=float),
             "lasts": np.zeros(n),
             "since_start": np.arange(n, dtype=float),

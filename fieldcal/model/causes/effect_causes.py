@@ -235,8 +235,9 @@ def _rows_in_motion() -> Experience:
     """Two rows in which every sensor effect changes some output."""
     six, two = np.linspace(1.0, 2.0, 12).reshape(2, 6), np.array([1.0, 2.0])
     held = Experience.at_rest(
-        0.1 * two, 0.2 * two, G0, w_dot=six[::-1, ACC],
-        slope=six, bend=six, missed=six, f_bend=six[:, ACC], variance=six[:, ACC],
+        0.1 * two, 0.2 * two, G0, w_dot=six[::-1, ACC], f_dot=six[::-1, GYR],
+        slope=six, bend=six, missed=six, f_bend=six[:, ACC], w_bend=six[:, GYR],
+        variance=six[:, ACC],
         warming=two, heating=two, t=two, since_start=two, since_turn=two,
         position=np.arange(2),
         joint_turns=JointTurns.of(two - 0.5, np.outer(two, [0.1, 0.2, 0.3])),

@@ -167,18 +167,19 @@ class MotionRows:
 
     def experience(self, response: Response) -> Experience:
         """The same as the inputs of effects."""
-        v, n, t = self.motion(response), len(self), self.middles
+        v, change, bend = (self.motion(response, order) for order in range(3))
+        n, t = len(self), self.middles
         missed: Array = np.zeros((n, 6))
         if self.uneven.any():
             missed = self._means_of(response.sensed, response.late, 1, self.uneven)
         unknown = np.full(n, np.nan)
         return Experience(
             alpha=unknown, beta=unknown, gamma=np.zeros(n),
-            f=v[:, ACC], w=v[:, GYR], w_dot=self.motion(response, 1)[:, GYR],
+            f=v[:, ACC], w=v[:, GYR], w_dot=change[:, GYR],
             slope=self._own_means([r.slope for r in self._responses]),
             bend=self._own_means([r.bend for r in self._responses]),
             missed=missed,
-            f_bend=self.motion(response, 2)[:, ACC],
+            f_dot=change[:, ACC], f_bend=bend[:, ACC], w_bend=bend[:, GYR],
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
             since_turn=np.full(n, np.inf), warming=self.warming,
             heating=self.heating, variance=np.zeros((n, 3)),

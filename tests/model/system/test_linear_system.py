@@ -114,7 +114,9 @@ EXPERIENCES = {
     "followed in motion": rows(
         slope=RNG.standard_normal((ROWS, 6)),
         bend=RNG.standard_normal((ROWS, 6)),
+        f_dot=RNG.standard_normal((ROWS, 3)),
         f_bend=RNG.standard_normal((ROWS, 3)),
+        w_bend=RNG.standard_normal((ROWS, 3)),
         missed=RNG.standard_normal((ROWS, 6)),
     ),
 }

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks._words import how_many, option
-from benchmarks.in_motion.pairs import HZ, KINDS, SECONDS, compared, pulls
+from benchmarks.in_motion.pairs import CALIBRATION, HZ, KINDS, SECONDS, compared, pulls
 
 USUAL, SEED = 40, 5_000
 
@@ -36,7 +36,7 @@ def main() -> None:
     for number in range(count):
         one, found, took = compared(number, seed, lag, jitter, length, hz)
         spent.append(took)
-        usual = {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
+        usual = set(CALIBRATION)
         usual |= {"bandwidth"} if lag and one.kind != "bandwidth" else set()
         usual |= {"stamp_error"} if jitter and one.kind != "stamp_error" else set()
         effects = {d.id for d in found.differences} - usual

@@ -18,6 +18,11 @@ from fieldcal.session import description
 
 SECONDS, HZ = 60.0, 25.0
 WHITE = np.repeat([0.02, 1e-3], 3)
+CALIBRATION = frozenset(
+    {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
+)
+"""Differences that are drawn beside each effect."""
+
 KINDS = (
     "", "lever_arm", "g_sensitivity", "time_delay", "cubic", "bandwidth",
     "second_order", "stamp_error", "increments", "flexible_mount",

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.never_wrong.bench import drawn
+from benchmarks.never_wrong.bench import Bench, drawn
 from benchmarks.never_wrong.bench_mistakes import BEFORE, spoilt
 from benchmarks.never_wrong.judging import Judged, judged, write
 from benchmarks.never_wrong.mistakes import AFTER, session
@@ -177,10 +177,13 @@ def main() -> None:
     _print(rows)
 
 
-def _try(seed: int, options: Options, rows: dict[str, list[Judged]]) -> None:
-    """One session, printed if it is not as it should be."""
+def draw_and_judge(
+    seed: int, options: Options, names: tuple[str, ...] | None = None
+) -> tuple[Bench, tuple[str, ...], Judged]:
+    """One session, its mistakes, drawn unless they are `names`, and what was said."""
     rng = np.random.default_rng(seed)
-    bench, names = drawn(rng), mistakes(seed, rng, options.only)
+    bench = drawn(rng)
+    names = mistakes(seed, rng, options.only) if names is None else names
     bench = spoilt(bench, names, rng)
     with tempfile.TemporaryDirectory() as where:
         folder = Path(where) / "session"
@@ -188,6 +191,12 @@ def _try(seed: int, options: Options, rows: dict[str, list[Judged]]) -> None:
         write(folder, written)
         truth = written.truth(bench)
         one = judged(folder, truth, bench.grade, options.diagnose, options.limit)
+    return bench, names, one
+
+
+def _try(seed: int, options: Options, rows: dict[str, list[Judged]]) -> None:
+    """One session, printed if it is not as it should be."""
+    bench, names, one = draw_and_judge(seed, options)
     rows[names[0] if names else SOUND].append(one)
     odd = one.wrong or one.over if one.go else not names
     if odd or one.late or options.each:

@@ -15,7 +15,15 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from benchmarks.in_motion.driven import Drive, coloured, recorded
-from benchmarks.in_motion.pairs import ABOUT, KINDS, WHITE, block_of, compared, pulls
+from benchmarks.in_motion.pairs import (
+    ABOUT,
+    CALIBRATION,
+    KINDS,
+    WHITE,
+    block_of,
+    compared,
+    pulls,
+)
 from fieldcal.against import Match
 from fieldcal.against.motion import compare_in_motion
 from fieldcal.against.motion.held import holds_positions
@@ -34,7 +42,6 @@ NAMES = ("recording", "simulator")
 NOISE = {"noise": {"white": WHITE, "markov": WHITE / 2, "tau": 2.0}}
 IN_MOTION = [name for name in catalogue() if kind(name).EXAMPLE.in_motion]
 """Effects that only a reference shows which follows the motion."""
-CALIBRATION = {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
 
 
 @pytest.fixture(scope="module")

@@ -32,6 +32,7 @@ from fieldcal.physics.lag import Lag
 class Bandwidth(Sensor):
     """Time constants of the accelerometers and of the gyroscopes."""
 
+    of_inputs = True
     params = (Param("acc", "s", 0.03), Param("gyr", "s", 0.03))
     while_moving = True
     covariate = "how fast specific force and rate change"

@@ -30,6 +30,7 @@ from fieldcal.physics.experience import Experience
 class FlexibleMount(Sensor):
     """Compliance of the structure below the accelerometers, by axis."""
 
+    of_inputs = True
     params = tuple(Param(i, "s^2", 3e-4) for i in "xyz")
     while_moving = True
     covariate = "second derivative of the specific force"

@@ -42,6 +42,7 @@ from fieldcal.physics.experience import Experience
 class Increments(Sensor):
     """What increments have that the motion at an instant has not."""
 
+    of_inputs = True
     params = (Param("sculling", "s", 0.01), Param("coning", "s^2", 1e-4))
     while_moving = True
     covariate = "rate across specific force, and rate across angular acceleration"

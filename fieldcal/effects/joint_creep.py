@@ -45,6 +45,7 @@ joint's own axis it does not matter when."""
 class JointCreep(Sensor):
     """Angles of the joints that relax after each turn."""
 
+    of_inputs = True
     params = (Param("alpha_deg", "deg", 0.1), Param("beta_deg", "deg", 0.1))
     shapes = (Shape("tau_s", "s", 0.7, 60.0, "joint"),)
     covariate = "time since the turn, along what each joint turns"

@@ -29,6 +29,7 @@ from fieldcal.physics.lag import Lag
 class StampError(Sensor):
     """Share of the stamps' unevenness that is their error."""
 
+    of_inputs = True
     params = (Param("share", "1", 1.0),)
     while_moving = True
     covariate = "how fast specific force and rate change, times what stamps are off by"

@@ -27,6 +27,7 @@ from fieldcal.physics.lag import Lag
 class TimeDelay(Sensor):
     """Delay of the gyroscopes."""
 
+    of_inputs = True
     params = (Param("seconds", "s", 0.05),)
     covariate = "angular acceleration in turns"
     decided_by = "faster turns"

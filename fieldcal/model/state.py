@@ -101,9 +101,10 @@ class State:
         for term in self.terms:
             if isinstance(term.effect, Sensor):
                 since_origin = replace(x, since_turn=since[term.origin])
-                out = out + term.effect.change_of_outputs(
+                change = term.effect.change_of_outputs(
                     since_origin, term.values, term.shape or NO_SHAPE
                 )
+                out = out + term.effect.gain(self.scale) * change
         return out
 
 

@@ -32,6 +32,7 @@ class AttitudeStep(Separable):
     shapes = (Shape("at_s", "s", -np.inf, np.inf, "instant"),)
     seen_in = "time"
     one_vector = True
+    of_inputs = True
 
     @abstractmethod
     def axes(self, x: Experience) -> Array:

@@ -171,17 +171,27 @@ class Sensor(Effect):
 
     kind = "sensor"
 
+    of_inputs: ClassVar[bool] = False
+    """Whether it changes what the sensors sense, as a turn of the device or a filter of
+    the motion does: the outputs change by the scale factors times as much, and by less
+    than nothing where an axis is mirrored."""
+
+    def gain(self, scale: Array) -> Array:
+        """Change of the six outputs per unit of `design`, from the scale factors."""
+        return scale if self.of_inputs else np.ones(6)
+
     @abstractmethod
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Differentiate the six outputs by the parameters, (n, 6, k).
 
-        Outputs in `samples.CHANNELS` order, m/s^2 and rad/s.
+        Outputs in `samples.CHANNELS` order, m/s^2 and rad/s; inputs, if the effect is
+        one `of_inputs`.
         """
 
     def change_of_outputs(
         self, x: Experience, values: Array, shape: Mapping[str, float] = NO_SHAPE
     ) -> Array:
-        """Change of the six outputs by parameters (k,), (n, 6)."""
+        """Change of the six outputs by parameters (k,), (n, 6), before `gain`."""
         out: Array = self.design(x, shape) @ values
         return out
 

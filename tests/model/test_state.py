@@ -225,3 +225,15 @@ def test_a_speed_may_be_another_in_all_rows_that_have_it() -> None:
         expected = np.zeros((7, 6))
         expected[at, 3:] = SCALE[3:] * x.w[at]
         np.testing.assert_allclose(found[:, :, j], expected)
+
+
+def test_what_is_sensed_changes_before_the_scale_factors_mirrored_ones_too() -> None:
+    """A device that slips in its mount turns the force, and an axis may be mirrored."""
+    mirrored = SCALE * [-1.0, 1.0, 1.0, 1.0, -1.0, 1.0]
+    axis, x = np.array([0.3, -0.5, 0.8]), rows()
+    slips = Term(EFFECTS["mount_slip"], axis, {"at_s": -np.inf})
+    plain = State(np.zeros(6), mirrored, np.zeros((5, 2)), np.zeros(3))
+    found = replace(plain, terms=(slips,)).output(x, np.zeros((1, len(x))))
+    back = Rotation.from_rotvec(np.deg2rad(axis)).inv()
+    expected = mirrored * np.hstack([back.apply(x.f), back.apply(x.w)])
+    np.testing.assert_allclose(found, expected, atol=1e-12)

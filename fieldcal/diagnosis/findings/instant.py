@@ -32,8 +32,10 @@ def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, f
     (at,) = group.shape.values()
     rows, block = explanation.rows, explanation.prepared.source.block
     known = _fitted_changes(explanation, member)
-    plain = rows.y - explanation.best.residual() - _change_of_outputs(rows.x, known)
-    change = _change_of_outputs(rows.x, known, dict.fromkeys(group.shape, -np.inf))
+    scale, before = explanation.state.scale, dict.fromkeys(group.shape, -np.inf)
+    jump = _change_of_outputs(rows.x, scale, known)
+    plain = rows.y - explanation.best.residual() - jump
+    change = _change_of_outputs(rows.x, scale, known, before)
     residual = np.where(rows.used, rows.y - plain, np.nan)
     low, high = _possible_instants(explanation, _squares(residual, change, rows.sd), at)
     part = slice(*np.searchsorted(block.t, [low, np.nextafter(high, np.inf)]))
@@ -104,6 +106,7 @@ def _fitted_changes(
 
 def _change_of_outputs(
     x: Experience,
+    scale: Array,
     known: list[tuple[Group, Array]],
     shape: Mapping[str, float] | None = None,
 ) -> Array:
@@ -112,5 +115,6 @@ def _change_of_outputs(
     for group, values in known:
         if isinstance(group.effect, Sensor):
             design = group.effect.design(x, shape or group.shape)
-            out += design[:, :, list(group.params)] @ values
+            change = design[:, :, list(group.params)] @ values
+            out += change * group.effect.gain(scale)
     return out

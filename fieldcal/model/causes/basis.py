@@ -126,5 +126,5 @@ def output_derivative(
             shape = term.shape or NO_SHAPE
             ends = (term.effect.design(x, shape) for x in (up, down))
             at_up, at_down = (design @ term.values for design in ends)
-            change = change + at_up - at_down
+            change = change + (at_up - at_down) * term.effect.gain(state.scale)
     return change / (2 * step)

@@ -217,12 +217,12 @@ def _parameter_subsets(
 
 
 def units_of(table: ColumnTable, effect: Effect) -> Array:
-    """Outputs per SI unit for each parameter, (k,); 1 for motion effects.
+    """Outputs per SI unit for each parameter, (k,); 1 for what changes inputs.
 
     The outputs are those that the parameter changes; accelerometers, if it changes both
     triads.
     """
-    if not isinstance(effect, Sensor):
+    if not isinstance(effect, Sensor) or effect.of_inputs:
         return np.ones(len(effect.params))
     reach = np.abs(effect.design(_rows_in_motion(), _any_shape(effect))).max(axis=0)
     gyro = (reach[GYR].max(axis=0) > 0) & (reach[ACC].max(axis=0) == 0)

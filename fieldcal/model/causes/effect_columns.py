@@ -42,7 +42,7 @@ def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> Gen
     def sensor(view: RowView) -> Array:
         inputs = view.with_origin(origin)
         design: Array = effect.design(inputs, shape or NO_SHAPE)  # type: ignore[attr-defined]
-        return design
+        return design * effect.gain(view.state.scale)[:, None]  # type: ignore[attr-defined]
 
     def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
         turned = state.turned(plain)
@@ -101,7 +101,9 @@ def separable_basis(
             courses = [effect.course(inputs, shape or NO_SHAPE) for shape, _ in points]
             product = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
             parts.append(product.reshape(len(view.x), 6, -1))
-        return np.concatenate(parts, axis=2)
+        gain = effect.gain(view.state.scale)[:, None]
+        columns: Array = np.concatenate(parts, axis=2) * gain
+        return columns
 
     return General(effect.id, of)
 

@@ -100,12 +100,13 @@ class MotionSystem(System):
             out[:, GYR] = rows.y[:, GYR] - state.output(gyr, since)[:, GYR]
         change = self.dictionary.current.change
         for triad, x, known in ((ACC, acc, rows.acc), (GYR, gyr, rows.gyr)):
-            out[:, triad] -= (
+            lag = (
                 known.late * change[:, triad]
                 + known.tau * x.slope[:, triad]
                 + known.second * x.bend[:, triad]
                 + rows.share * x.missed[:, triad]
             )
+            out[:, triad] -= state.scale[triad] * lag
         return out
 
     @staticmethod

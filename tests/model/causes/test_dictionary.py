@@ -494,21 +494,21 @@ def test_a_vector_is_along_one_axis_or_has_all_its_components(name: str) -> None
 
 
 def test_sizes_of_parameters_are_in_the_unit_of_what_they_change() -> None:
-    """Whatever unit they have themselves: a delay of gyroscopes is in s."""
+    """Whatever unit they have themselves; of inputs in SI, whatever the outputs are."""
     effects = catalogue()
     acc, gyr = UNIT[0], UNIT[3]
     for name, expected in {
         "gyro_scale": [gyr] * 3,
         "gyro_cross_coupling": [gyr] * 6,
         "gyro_products": [gyr] * 9,
-        "time_delay": [gyr],
-        "bandwidth": [acc, gyr],
-        "second_order": [acc, gyr],
-        "increments": [acc, gyr],
+        "time_delay": [1.0],
+        "bandwidth": [1.0, 1.0],
+        "second_order": [1.0, 1.0],
+        "increments": [1.0, 1.0],
         "g_sensitivity": [gyr] * 9,
         "quadratic": [acc] * 3,
         "bias_step": [acc] * 3 + [gyr] * 3,
-        "mount_slip": [acc] * 3,
+        "mount_slip": [1.0] * 3,
         "lever_arm": [1.0] * 3,
         "random_walk": [1.0] * 6,
     }.items():

@@ -251,7 +251,7 @@ def test_a_share_of_what_stamps_miss_is_known() -> None:
     there = replace(there, y=BIAS + SCALE * there.motion(there.acc))
     left = whitened(system_of(there), state())
     system = system_of(there)
-    expected = there.cosines(-0.4 * missed) / np.sqrt(system.power)
+    expected = there.cosines(-0.4 * SCALE * missed) / np.sqrt(system.power)
     np.testing.assert_allclose(left, expected, atol=1e-9)
     assert np.abs(expected).max() > 1e-3
 

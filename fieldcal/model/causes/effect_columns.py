@@ -28,6 +28,7 @@ from fieldcal.physics.effect import (
     BiasChange,
     Effect,
     Motion,
+    Sensor,
     Separable,
 )
 from fieldcal.physics.experience import Experience
@@ -37,40 +38,55 @@ DERIVATIVE_STEP = 1e-3
 
 
 def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> General:
-    """Columns of an effect of the catalogue."""
+    """Columns of an effect of the catalogue.
 
-    def sensor(view: RowView) -> Array:
-        inputs = view.with_origin(origin)
-        design: Array = effect.design(inputs, shape or NO_SHAPE)  # type: ignore[attr-defined]
-        return design * effect.gain(view.state.scale)[:, None]  # type: ignore[attr-defined]
+    Raises
+    ------
+    TypeError
+        If the effect has no equation.
 
-    def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
-        turned = state.turned(plain)
+    """
+    if isinstance(effect, Sensor):
+        return _sensor_basis(effect, shape, origin)
+    if isinstance(effect, Motion):
+        return _motion_basis(effect)
+    raise TypeError(f"{effect.id} has no equation")
+
+
+def _sensor_basis(effect: Sensor, shape: Mapping[str, float], origin: int) -> General:
+    def of(view: RowView) -> Array:
+        gain = effect.gain(view.state.scale)[:, None]
+        return effect.design(view.with_origin(origin), shape or NO_SHAPE) * gain
+
+    return General(effect.id, of)
+
+
+def _motion_basis(effect: Motion) -> General:
+    def steps() -> Iterator[Array]:
         for j, param in enumerate(effect.params):
             step = np.zeros(len(effect.params))
             step[j] = DERIVATIVE_STEP * param.typical
+            yield step
+
+    def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
+        turned = state.turned(plain)
+        for step in steps():
             up, down = (
                 _with_changed_parameters(turned, state, effect, s)
                 for s in (step, -step)
             )
-            yield up, down, float(step[j])
+            yield up, down, float(step.max())
 
     def on_the_way(view: RowView) -> Array:
         columns = []
-        for j, param in enumerate(effect.params):
-            step = np.zeros(len(effect.params))
-            step[j] = DERIVATIVE_STEP * param.typical
-            ends = [effect.change(view.x, s) for s in (step, -step)]  # type: ignore[attr-defined]
-            columns.append(
-                output_derivative(ends[0], ends[1], float(step[j]), view.state)
-            )
+        for step in steps():
+            up, down = (effect.change(view.x, s) for s in (step, -step))
+            columns.append(output_derivative(up, down, float(step.max()), view.state))
         return np.stack(columns, axis=2)
 
-    if isinstance(effect, Motion):
-        if effect.on_the_way:
-            return General(effect.id, on_the_way)
-        return General(effect.id, central_differences(sides), sides=sides)
-    return General(effect.id, sensor)
+    if effect.on_the_way:
+        return General(effect.id, on_the_way)
+    return General(effect.id, central_differences(sides), sides=sides)
 
 
 def bias_change_basis(

@@ -134,17 +134,20 @@ def run(args: argparse.Namespace) -> int:
 
 def _diagnose_session(args: argparse.Namespace) -> int:
     """Diagnose one session and write the diagnosis."""
+    from fieldcal.commands.progress import SEARCH, show_work
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare_recording
     from fieldcal.diagnosis.verdict import make_diagnosis
     from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
-    explanation = explain(prepare_recording(session.block, session.about))
-    found = make_diagnosis(session.block, explanation)
-    again = (
-        _replay_on_twin(args.twin, session, explanation, found) if args.twin else None
-    )
+    with show_work(args, f"{SEARCH} {args.session}"):
+        explanation = explain(prepare_recording(session.block, session.about))
+        found = make_diagnosis(session.block, explanation)
+    again = None
+    if args.twin:
+        with show_work(args, f"replaying {args.session} on its twin"):
+            again = _replay_on_twin(args.twin, session, explanation, found)
     if again is not None:
         found = replace(found, says=f"{found.says} {again.says}")
     content = found.to_json()

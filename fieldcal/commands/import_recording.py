@@ -236,6 +236,7 @@ def _selected_streams(recording: Recording, wanted: list[str]) -> list[ImuStream
 def _import_stream(
     args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
 ) -> ImportedSession:
+    from fieldcal.commands.progress import show_work
     from fieldcal.importing.session.ingest import import_stream
     from fieldcal.importing.units.unit_guess import settle_units
     from fieldcal.session.units import UNSCALED
@@ -247,7 +248,9 @@ def _import_stream(
         about["units"] = kept
     if args.rate and recording.wanted.rate_hz:
         about["sampling"] = {"rate_hz": args.rate}
-    guessed, bias = settle_units(recording, stream.name)
+    reading = f"reading {recording.path}"
+    with show_work(args, reading):
+        guessed, bias = settle_units(recording, stream.name)
     if bias:
         about["nominal"] = {"acc_bias": bias}
     if guessed:
@@ -255,7 +258,8 @@ def _import_stream(
         stream = next(s for s in recording.streams() if s.name == stream.name)
     if (scatter := recording.scatter()) is not None:
         return _import_means(args, recording, stream, folder, about, scatter)
-    imported = import_stream(recording, stream.name, folder, about, args.still)
+    with show_work(args, reading):
+        imported = import_stream(recording, stream.name, folder, about, args.still)
     err = sys.stderr.write
     err(
         f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"

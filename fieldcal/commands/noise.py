@@ -63,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal.commands.progress import show_work
     from fieldcal.session.folder import check_writable
     from fieldcal.session.noise_file import NOISE
 
@@ -74,9 +75,9 @@ def run(args: argparse.Namespace) -> int:
             _open_session(path, Path(place) / str(i))
             for i, path in enumerate(args.sessions)
         ]
-        found = noise_result(
-            sessions, args.limits, args.history, [str(p) for p in args.sessions]
-        )
+        names = [str(path) for path in args.sessions]
+        with show_work(args, f"estimating the noise of {', '.join(names)}"):
+            found = noise_result(sessions, args.limits, args.history, names)
     content = found.to_json()
     folder = next((s for s, p in zip(sessions, args.sessions, strict=True)
                    if p.is_dir()), None)  # fmt: skip

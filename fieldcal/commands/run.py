@@ -210,6 +210,7 @@ def _run_and_show(
 ) -> int:
     from fieldcal.calibration import limits
     from fieldcal.commands import run_view
+    from fieldcal.commands.progress import SEARCH, show_work
     from fieldcal.commands.run_results import (
         check_companions,
         first_result,
@@ -224,14 +225,16 @@ def _run_and_show(
     try:
         found, truth, others = _record_and_solve(args, task, folder, bounds, page)
         tell_calculation(args)
-        found = first_result(found, folder, bounds, history)
+        with show_work(args, f"{SEARCH} {folder}"):
+            found = first_result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
         show_end_on_page(page, (), error)
         report_broken_run(args, task, folder, error)
         raise
     if args.junit:
         write_junit(args.junit, task, folder, found.to_json())
-    further = further_results(others, bounds, history)
+    with show_work(args, f"{SEARCH} the recordings of the further devices"):
+        further = further_results(others, bounds, history)
     show_end_on_page(page, (found, *further.values()))
     if args.json:
         run_view.show_json(found, truth, further)

@@ -61,7 +61,8 @@ def _sessions_with_rows(args: argparse.Namespace) -> list[StoredSession]:
         If a session cannot be solved.
 
     """
-    from fieldcal.commands.batch import process_with_progress, worker_pool
+    from fieldcal.commands.batch import worker_pool
+    from fieldcal.commands.progress import process_with_progress
     from fieldcal.fleet.batch import SessionBatch
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in

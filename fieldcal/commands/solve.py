@@ -88,26 +88,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.decision_view import show_decision
-    from fieldcal.commands.install_values import add_install_values
     from fieldcal.commands.lot_prior_view import show_lot_prior
     from fieldcal.commands.over_time_view import show_over_time
+    from fieldcal.commands.progress import SEARCH, show_work
     from fieldcal.commands.table import show_calibration
-    from fieldcal.evaluation.observations import usable_windows
-    from fieldcal.evaluation.omitted_effects import with_repaired_bytes
     from fieldcal.session.folder import RESULT, Session
 
     session = Session.open(args.session)
-    if not args.as_printed:
-        session, repaired = with_repaired_bytes(session)
-    still = usable_windows(session)
-    found = _solve_session(args, session, still)
-    if not args.as_printed:
-        found = replace(found, warnings=(*repaired, *found.warnings))
-    found = add_install_values(found, session)
-    over_time = _solve_over_time(session) if args.over_time else None
-    if over_time is not None:
-        found = replace(found, info={**found.info, "over_time": over_time})
-    found = _decide(args, found, session, still)
+    with show_work(args, f"{SEARCH} {args.session}"):
+        found = _solve_and_decide(args, session)
     if args.json:
         for warning in found.warnings:
             sys.stderr.write(f"fieldcal solve: {warning}\n")
@@ -122,6 +111,25 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(f"written: {path}\n")
     go = found.info.get("decision", {}).get("go", True)
     return 0 if found.good and go else 1
+
+
+def _solve_and_decide(args: argparse.Namespace, session: Session) -> Calibration:
+    """Calibration of a session with what the options ask for, and its decision."""
+    from fieldcal.commands.install_values import add_install_values
+    from fieldcal.evaluation.observations import usable_windows
+    from fieldcal.evaluation.omitted_effects import with_repaired_bytes
+
+    repaired: tuple[str, ...] = ()
+    if not args.as_printed:
+        session, repaired = with_repaired_bytes(session)
+    still = usable_windows(session)
+    found = _solve_session(args, session, still)
+    found = replace(found, warnings=(*repaired, *found.warnings))
+    found = add_install_values(found, session)
+    over_time = _solve_over_time(session) if args.over_time else None
+    if over_time is not None:
+        found = replace(found, info={**found.info, "over_time": over_time})
+    return _decide(args, found, session, still)
 
 
 def _solve_session(

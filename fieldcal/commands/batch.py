@@ -68,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
+    from fieldcal.history.repeats import copy_sentence
     from fieldcal.session.folder import check_writable
 
     check_writable(args.output)
@@ -85,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
         with worker_pool(args) as pool:
             process_with_progress(batch, left, pool)
     batch.write(args.output)
+    for pair in batch.shorter_copies():
+        sys.stderr.write(f"fieldcal batch: {copy_sentence(*pair)}\n")
     return _print_summary(args, batch, len(left))
 
 

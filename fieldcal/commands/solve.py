@@ -185,6 +185,7 @@ def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
     from fieldcal.history import filters, sessions
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
+    from fieldcal.history.repeats import copy_sentence, shorter_copies
     from fieldcal.session.recorded_part import recorded_part
 
     wanted = filters.parse_filters(args.lot)
@@ -194,6 +195,8 @@ def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
     )
     if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
         sys.stderr.write(f"fieldcal solve: {lost}\n")
+    for pair in database.run(lambda db: shorter_copies(db, wanted)):
+        sys.stderr.write(f"fieldcal solve: {copy_sentence(*pair)}\n")
     serial = str(session.about.device.get("serial", ""))
     folder = str(session.folder.resolve())
     part = recorded_part(session.folder)

@@ -158,6 +158,11 @@ class Description:
         return bool(self.raw.get("site", {}).get("sways", False))
 
     @property
+    def recording_id(self) -> str:
+        """Id that the recorder wrote into the session; empty without one."""
+        return str(self.raw.get("recording", {}).get("id", ""))
+
+    @property
     def angles_from(self) -> str:
         """Source of the stated angles; empty if not stated."""
         return str(self.raw.get("site", {}).get("angles_from", ""))

@@ -6,7 +6,8 @@ the device is silent. Every `SYNC_INTERVAL` seconds they are written to the disk
 are appended one line at a time, each with its checksum. Both files grow by whole pieces
 only: a piece that is written in part is removed. So after a kill everything up to the
 last fifth of a second can be read, and an interrupted recording can be continued: what
-follows its last whole batch is cut off, and the next batch is appended.
+follows its last whole batch is cut off, and the next batch is appended. The session has
+a random id from its beginning, by which its copies are known whenever they were made.
 
 All writing is done in one thread of its own. A Ctrl-C may come between any two
 instructions of the main thread: it ends the waiting for a piece to be written, and
@@ -24,6 +25,7 @@ from pathlib import Path
 from threading import Event, Lock, Thread
 from time import monotonic, time
 from typing import Any, Self
+from uuid import uuid4
 
 import numpy as np
 
@@ -160,8 +162,10 @@ class Recorder:
         if any((self.folder / name).exists() for name in names):
             raise FileExistsError
         self._samples = _AppendOnlyFile(self.folder / SAMPLES)
+        # that of a plan which is a session.toml is another run's
+        whole = {**about, "recording": {"id": uuid4().hex}}
         try:
-            write_atomically(self.folder / DESCRIPTION, tomlkit.dumps(about))
+            write_atomically(self.folder / DESCRIPTION, tomlkit.dumps(whole))
             self._marks = _AppendOnlyFile(self.folder / MARKS)
         except BaseException:
             # empty files must not prevent the next attempt

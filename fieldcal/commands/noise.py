@@ -75,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
             _open_session(path, Path(place) / str(i))
             for i, path in enumerate(args.sessions)
         ]
+        _check_other_samples(args.sessions, sessions)
         names = [str(path) for path in args.sessions]
         with show_work(args, f"estimating the noise of {', '.join(names)}"):
             found = noise_result(sessions, args.limits, args.history, names)
@@ -116,6 +117,25 @@ def _check_distinct(paths: Sequence[Path]) -> None:
     for i, place in enumerate(places):
         if place in places[:i]:
             raise InputError(f"{paths[i]}: is there twice: give each session once")
+
+
+def _check_other_samples(paths: Sequence[Path], sessions: Sequence[Session]) -> None:
+    """Refuse copies of a recording: its noise would count as more.
+
+    Raises
+    ------
+    InputError
+        Naming both.
+
+    """
+    from fieldcal.core.errors import InputError
+    from fieldcal.session.recorded_part import same_recording
+
+    if pair := same_recording([session.folder for session in sessions]):
+        first, second = (paths[i] for i in pair)
+        raise InputError(
+            f"{second}: has the samples of {first}: give each recording once"
+        )
 
 
 def _open_session(path: Path, place: Path) -> Session:

@@ -112,7 +112,21 @@ def read_points(paths: Sequence[Path]) -> list[ThermalPoint]:
         listed = ", ".join(f"{name} of {serial}" for serial, name in serials.items())
         raise InputError(f"{listed}: give sessions of one device")
     _check_distinct(points)
+    _check_other_samples(paths)
     return points
+
+
+def _check_other_samples(paths: Sequence[Path]) -> None:
+    """Refuse copies of a recording, of which one may have been continued since."""
+    from fieldcal.session.folder import RESULT
+    from fieldcal.session.recorded_part import same_recording
+
+    folders = [path.parent if path.name == RESULT else path for path in paths]
+    if pair := same_recording(folders):
+        first, second = (paths[i] for i in pair)
+        raise InputError(
+            f"{second}: has samples of {first}: give each recording once, the longer"
+        )
 
 
 def _check_distinct(points: Sequence[ThermalPoint]) -> None:

@@ -12,6 +12,7 @@ session.toml that was copied to other samples does not make these a copy.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,6 +39,16 @@ def recorded_part(folder: Path) -> RecordedPart | None:
         return whole
     start, end = min(w[0] for w in windows), max(w[1] for w in windows)
     return replace(whole, start=start, end=end)
+
+
+def same_recording(folders: Sequence[Path]) -> tuple[int, int] | None:
+    """Numbers of the first two sessions that use the same samples; None if none do."""
+    parts = [recorded_part(folder) for folder in folders] if len(folders) > 1 else []
+    for j, one in enumerate(parts):
+        for i, other in enumerate(parts[:j]):
+            if one and other and one.overlaps(other):
+                return i, j
+    return None
 
 
 def _whole_recording(path: Path, recording_id: str) -> RecordedPart:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import CHANNELS, Block
+from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.windows.alternation import CLEAR, TwoMeans, alternating_means
 
 MOST_SAMPLES = 500
@@ -40,6 +40,23 @@ def difference_text(means: TwoMeans) -> str:
         if clear[at] > CLEAR:
             parts.append(f"{CHANNELS[at]} by {abs(means.apart[at]):.2g} {unit}")
     return " and ".join(parts)
+
+
+def mixed_samples_text(six: Array) -> str:
+    """What shows that samples as they arrive are of two devices; empty if they do not.
+
+    Parameters
+    ----------
+    six : consecutive samples, (n, 6) m/s^2 and rad/s; nan where there is none
+
+    """
+    means = alternating_means(six)
+    if means is None:
+        return ""
+    return (
+        "two devices seem to send on one port: the samples change to and fro in"
+        f" {difference_text(means)}"
+    )
 
 
 def find_mixed_devices(

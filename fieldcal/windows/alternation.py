@@ -47,19 +47,27 @@ LEAST_OUTPUTS = 2
 
 
 class TwoMeans(NamedTuple):
-    """What the samples of two devices differ by.
+    """Means of the samples of two devices; which is which is not known.
 
     Attributes
     ----------
-    apart : difference of their means, (6,) of either sign, m/s^2 and rad/s; 0 in
-        outputs that have no values
+    one, other : means of the samples of each, (6,) m/s^2 and rad/s; 0 in outputs that
+        have no values
     noise : standard deviation of a sample of one device, or the step of an output that
         has less noise than that, (6,); 1 in outputs that have no values
+    error : standard deviation of the difference of the means, in units of `noise`
 
     """
 
-    apart: Array
+    one: Array
+    other: Array
     noise: Array
+    error: float
+
+    @property
+    def apart(self) -> Array:
+        """Difference of the means, (6,) of either sign, m/s^2 and rad/s."""
+        return self.one - self.other
 
 
 def alternating_means(six: Array) -> TwoMeans | None:
@@ -88,8 +96,10 @@ def alternating_means(six: Array) -> TwoMeans | None:
     clear = np.abs(apart) > np.maximum(CLEAR * noise, LEAST_STEPS * steps)
     if np.count_nonzero(clear) < LEAST_OUTPUTS:
         return None
-    found = TwoMeans(np.zeros(len(live)), np.ones(len(live)))
-    found.apart[live], found.noise[live] = apart, np.maximum(noise, steps)
+    error = float(np.sqrt(1 / len(one) + 1 / len(other)))
+    found = TwoMeans(np.zeros(6), np.zeros(6), np.ones(6), error)
+    found.one[live], found.other[live] = one.mean(axis=0), other.mean(axis=0)
+    found.noise[live] = np.maximum(noise, steps)
     return found
 
 

@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.core.positions import FIVE_POSITIONS
     from fieldcal.planning import planner
     from fieldcal.planning.aliasing import find_aliases
-    from fieldcal.session.description import parse_description
+    from fieldcal.session.description_file import parse_description
 
     tables = plan_tables(args)
     about = parse_description(tables)

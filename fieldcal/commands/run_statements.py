@@ -84,7 +84,7 @@ def _write(session: Session, given: Mapping[str, Mapping[str, Any]]) -> None:
     import tomlkit
 
     from fieldcal.run.companions import companion_folders
-    from fieldcal.session.description import parse_description
+    from fieldcal.session.description_file import parse_description
     from fieldcal.session.folder import DESCRIPTION, write_atomically
     from fieldcal.session.lock import SessionLock
 

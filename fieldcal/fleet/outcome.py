@@ -27,7 +27,7 @@ from fieldcal.evaluation.solution import solve_prepared
 from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration
-from fieldcal.session.description import with_bare_names
+from fieldcal.session.description_file import with_bare_names
 from fieldcal.session.folder import DESCRIPTION, Session
 from fieldcal.session.recorded_part import recorded_part
 

@@ -27,7 +27,7 @@ from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, impossible_rate_text
-from fieldcal.session import description, sample_files
+from fieldcal.session import description_file, sample_files
 from fieldcal.session.blank_samples import (
     are_lost,
     blank_rows,
@@ -79,7 +79,7 @@ class Session:
         """
         folder = Path(folder)
         refuse_undecodable_path(folder)
-        about = description.read_description(folder / DESCRIPTION)
+        about = description_file.read_description(folder / DESCRIPTION)
         says: list[str] = []
         marks = list(read_marks(folder / MARKS, says))
         says += _guess_warnings(about.raw)
@@ -259,7 +259,7 @@ def _with_added_positions(
 ) -> Description:
     """The description with the positions that were added during the run appended."""
     added = [mark for mark in marks if mark.get("event") == POSITION_ADDED]
-    return description.with_added_positions(about, parse_positions(added)[0])
+    return description_file.with_added_positions(about, parse_positions(added)[0])
 
 
 def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:

@@ -19,7 +19,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.session import description, sample_files
+from fieldcal.session import description_file, sample_files
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
@@ -277,7 +277,7 @@ names = st.sampled_from(["site", "frame", "nominal", "model", "position", "units
 @given(st.dictionaries(names, json_values | tables | st.lists(tables, max_size=3)))
 def test_any_table_is_read_or_refused_in_words(raw: dict[str, Any]) -> None:
     try:
-        about = description.parse_description(raw)
+        about = description_file.parse_description(raw)
     except InputError as error:
         assert str(error)
     else:

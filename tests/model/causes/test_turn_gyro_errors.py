@@ -21,7 +21,7 @@ from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.turn_gyro_errors import turn_gyro_errors
 from fieldcal.physics.experience_rows import select_rows
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile, Sampling, Truth
 

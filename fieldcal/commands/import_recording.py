@@ -238,7 +238,7 @@ def _import_stream(
 ) -> ImportedSession:
     from fieldcal.commands.progress import show_work
     from fieldcal.importing.session.ingest import import_stream
-    from fieldcal.importing.units.unit_guess import settle_units
+    from fieldcal.importing.units.settled_units import settle_units
     from fieldcal.session.units import UNSCALED
 
     name = recording.path.name.split(".")[0]

@@ -13,7 +13,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.text.paired_cells import PairedCells
-from fieldcal.importing.units.unit_guess import settle_units
+from fieldcal.importing.units.settled_units import settle_units
 
 ROWS = turned(17, 50.0, 2.0)
 T, A, W = ROWS[:, 0], ROWS[:, 1:4], ROWS[:, 4:]

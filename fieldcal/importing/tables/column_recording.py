@@ -34,7 +34,8 @@ from fieldcal.importing.recording import (
 from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.axis_triples import unnamed_axes
 from fieldcal.importing.tables.column_choices import ask_of_choices, columns_option
-from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, column_numbers
+from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate
+from fieldcal.importing.tables.column_source import column_numbers
 from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times

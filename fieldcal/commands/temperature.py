@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.export import number_of_sensor
+from fieldcal.commands.temperature_view import show_model
 from fieldcal.core.errors import InputError
 from fieldcal.core.escaping import escape_line
 
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
     else:
-        _print_model(found, args.at, points[-1])
+        show_model(found, args.at, points[-1])
     for sentence in (*groups_left_out(points), *find_disagreements(found)):
         sys.stderr.write(f"fieldcal temperature: {sentence}\n")
     if args.output:
@@ -204,48 +205,6 @@ def _at_temperature(
         "since_degc": last.temperature,
         "change": change_document(found.change(to, last.temperature)),
     }
-
-
-def _print_model(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
-    from fieldcal.calibration.wording import (
-        format_unit,
-        format_with_sigma,
-        parameter_title,
-    )
-    from fieldcal.commands.text_columns import text_columns
-    from fieldcal.thermal.wording import REPORTED_SIGMAS, change_sentences
-
-    say = sys.stdout.write
-    say(
-        f"{len(found.sessions)} sessions at {found.low:.1f} to {found.high:.1f} °C;"
-        " between them, ± 1σ:\n"
-    )
-    shown = [found.low, found.reference, found.high]
-    if at is not None:
-        shown = sorted({*shown, at})
-    heads = [f"{t:.1f} °C" for t in shown]
-    rows = [["parameter", *heads, "from run to run", "order"]]
-    values = {t: found.at(t) for t in shown}
-    for name, curve in found.curves.items():
-        cells = [" ± ".join(format_with_sigma(*values[t][name])) for t in shown]
-        order = f"{curve.order} (P = {curve.orders[curve.order]:.2f})"
-        unit = format_unit(curve.unit)
-        spread = f"± {curve.spread:.2g} {unit}".rstrip()
-        rows.append([parameter_title(name), *cells, spread, order])
-    for line in text_columns(rows):
-        say(line + "\n")
-    if at is not None:
-        told, rest = change_sentences(found.change(at, last.temperature))
-        say(
-            f"\nat {at:.1f} °C with the calibration of {escape_line(last.name)}"
-            f" ({last.temperature:.1f} °C), off by:\n"
-        )
-        say("".join(f"  {line}\n" for line in told))
-        if rest:
-            say(
-                f"  less than {REPORTED_SIGMAS:.0f} of its ±:"
-                f" {', '.join(map(parameter_title, rest))}\n"
-            )
 
 
 def _autopilot_parameters(

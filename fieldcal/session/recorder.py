@@ -17,7 +17,6 @@ never comes between its bytes and what is remembered of them.
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -32,6 +31,7 @@ import numpy as np
 from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.samples import Block, concat
+from fieldcal.session.append_only_file import AppendOnlyFile
 from fieldcal.session.folder import DESCRIPTION, write_atomically
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
@@ -51,41 +51,6 @@ SAMPLES = "samples.arrows"
 
 LEAST_BREAK = 1.0
 """Least gap in the times after a lost link, s of device time."""
-
-
-class _AppendOnlyFile:
-    """A file to which whole pieces are appended.
-
-    Parameters
-    ----------
-    path : of the file
-    size : bytes of it to keep; None creates it, or raises FileExistsError
-
-    """
-
-    def __init__(self, path: Path, size: int | None = None) -> None:
-        how = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0)
-        self.fd = os.open(path, how | (os.O_EXCL if size is None else 0), 0o644)
-        self._size = size or 0
-        os.ftruncate(self.fd, self._size)
-
-    def append(self, data: bytes) -> None:
-        """Write all of it, or nothing and raise OSError."""
-        left = memoryview(data)
-        try:
-            while left:
-                left = left[os.write(self.fd, left) :]
-        except OSError:
-            with contextlib.suppress(OSError):
-                os.ftruncate(self.fd, self._size)
-            raise
-        self._size += len(data)
-
-    def sync(self) -> None:
-        os.fsync(self.fd)
-
-    def close(self) -> None:
-        os.close(self.fd)
 
 
 class Recorder:
@@ -161,12 +126,12 @@ class Recorder:
         names = (DESCRIPTION, SAMPLES, MARKS)
         if any((self.folder / name).exists() for name in names):
             raise FileExistsError
-        self._samples = _AppendOnlyFile(self.folder / SAMPLES)
+        self._samples = AppendOnlyFile(self.folder / SAMPLES)
         # that of a plan which is a session.toml is another run's
         whole = {**about, "recording": {"id": uuid4().hex}}
         try:
             write_atomically(self.folder / DESCRIPTION, tomlkit.dumps(whole))
-            self._marks = _AppendOnlyFile(self.folder / MARKS)
+            self._marks = AppendOnlyFile(self.folder / MARKS)
         except BaseException:
             # empty files must not prevent the next attempt
             self._samples.close()
@@ -191,10 +156,10 @@ class Recorder:
             self.link_reopened()
         else:
             self._encoder = ArrowEncoder(samples_schema())
-        self._samples = _AppendOnlyFile(path, end)
+        self._samples = AppendOnlyFile(path, end)
         marks = self.folder / MARKS
         lines = marks.read_bytes() if marks.exists() else b""
-        self._marks = _AppendOnlyFile(marks, lines.rfind(b"\n") + 1)
+        self._marks = AppendOnlyFile(marks, lines.rfind(b"\n") + 1)
 
     def link_reopened(self) -> None:
         """Note that the link was opened again: the device may have restarted."""

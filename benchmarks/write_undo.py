@@ -31,7 +31,7 @@ from fieldcal.drivers.mavlink_installed import (
 )
 from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32
 from fieldcal.install import transaction
-from fieldcal.session import folder
+from fieldcal.session import file_writing
 from fieldcal.sim_device.autopilot import Autopilot
 
 TRIALS = 1000
@@ -197,7 +197,7 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
         clock = lambda: vehicle.now  # noqa: E731
         return ParameterLink("virtual", vehicle.connect, clock, vehicle.pause)
 
-    written = folder.write_atomically
+    written = file_writing.write_atomically
 
     def write_atomically(path: Path, content: str | bytes) -> Path:
         vehicle.step()

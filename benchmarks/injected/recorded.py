@@ -22,7 +22,7 @@ from fieldcal.core.frames import angles_of_force_direction
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.session.ingest import import_stream
 from fieldcal.session import description_file
 from fieldcal.session.description import Description

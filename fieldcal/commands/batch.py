@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
     from fieldcal.history.repeats import copy_sentence
-    from fieldcal.session.folder import check_writable
+    from fieldcal.session.file_writing import check_writable
 
     check_writable(args.output)
     if args.limits:

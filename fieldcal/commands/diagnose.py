@@ -179,7 +179,7 @@ def _replay_on_twin(
 ) -> ReplayResult:
     """Replay the session on its twin, and write the twin's device file."""
     from fieldcal.diagnosis.findings.quality import fit_recorded_samples
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.session.file_writing import write_atomically
     from fieldcal.sim_device.profile_file import to_toml
     from fieldcal.twin import replay_session
 

@@ -13,11 +13,7 @@ from fieldcal.core.gravity import G0
 
 if TYPE_CHECKING:
     from fieldcal.core.samples import Array
-    from fieldcal.importing.recording import (
-        ImuStream,
-        MeanScatter,
-        Recording,
-    )
+    from fieldcal.importing.recording import ImuStream, MeanScatter, Recording
     from fieldcal.importing.session.ingest import ImportedSession
 
 

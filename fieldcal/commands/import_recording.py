@@ -19,10 +19,7 @@ from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.gravity import G0
 
 if TYPE_CHECKING:
-    from fieldcal.importing.recording import (
-        ImuStream,
-        Recording,
-    )
+    from fieldcal.importing.recording import ImuStream, Recording
     from fieldcal.importing.session.ingest import ImportedSession
 
 RARE = (

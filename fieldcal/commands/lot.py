@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)
     if args.report:
         from fieldcal.report.lot_page import render_lot_page
-        from fieldcal.session.folder import write_atomically
+        from fieldcal.session.file_writing import write_atomically
 
         write_atomically(
             args.report, render_lot_page(found, " ".join(args.query) or "everything")

@@ -25,7 +25,8 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.table import show_calibration
     from fieldcal.navigator.session_runs import calibrate_navigator
     from fieldcal.session import description_file
-    from fieldcal.session.folder import DESCRIPTION, RESULT, write_atomically
+    from fieldcal.session.file_writing import write_atomically
+    from fieldcal.session.folder import DESCRIPTION, RESULT
 
     about = description_file.read_description(args.session / DESCRIPTION)
     found = calibrate_navigator(args.session, about)

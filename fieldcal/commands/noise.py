@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.progress import show_work
-    from fieldcal.session.folder import check_writable
+    from fieldcal.session.file_writing import check_writable
     from fieldcal.session.noise_file import NOISE
 
     if args.report:
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.report.noise_page import render_noise_page
-        from fieldcal.session.folder import write_atomically
+        from fieldcal.session.file_writing import write_atomically
 
         written = write_atomically(args.report, render_noise_page(found))
         (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")

@@ -93,7 +93,7 @@ def write_plan(
     """
     import tomlkit
 
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.session.file_writing import write_atomically
     from fieldcal.session.position_tables import position_table
 
     if path.exists():

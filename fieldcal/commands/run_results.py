@@ -52,8 +52,8 @@ def solve_and_decide(
     """
     from fieldcal.acceptance.assessment import assess, store_in_history
     from fieldcal.commands.install_values import add_install_values
-    from fieldcal.evaluation.observations import usable_windows
     from fieldcal.evaluation.solution import solve_session
+    from fieldcal.evaluation.usable_windows import usable_windows
     from fieldcal.session.folder import RESULT
 
     still = usable_windows(session)

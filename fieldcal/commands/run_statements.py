@@ -85,7 +85,8 @@ def _write(session: Session, given: Mapping[str, Mapping[str, Any]]) -> None:
 
     from fieldcal.run.companions import companion_folders
     from fieldcal.session.description_file import parse_description
-    from fieldcal.session.folder import DESCRIPTION, write_atomically
+    from fieldcal.session.file_writing import write_atomically
+    from fieldcal.session.folder import DESCRIPTION
     from fieldcal.session.lock import SessionLock
 
     parse_description(merge_tables(session.about.raw, given))  # refuses what cannot be

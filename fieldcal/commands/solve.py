@@ -17,7 +17,7 @@ from fieldcal.core.factory import FACTORY_KEYS
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.calibration.lot_prior import LotPrior
-    from fieldcal.evaluation.observations import UsableWindows
+    from fieldcal.evaluation.usable_windows import UsableWindows
     from fieldcal.session.folder import Session
 
 RARE = ("as_printed", "method", "heading", "history", "lot")
@@ -116,8 +116,8 @@ def run(args: argparse.Namespace) -> int:
 def _solve_and_decide(args: argparse.Namespace, session: Session) -> Calibration:
     """Calibration of a session with what the options ask for, and its decision."""
     from fieldcal.commands.install_values import add_install_values
-    from fieldcal.evaluation.observations import usable_windows
     from fieldcal.evaluation.omitted_effects import with_repaired_bytes
+    from fieldcal.evaluation.usable_windows import usable_windows
 
     repaired: tuple[str, ...] = ()
     if not args.as_printed:

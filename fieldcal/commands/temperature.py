@@ -233,7 +233,7 @@ def _write_model(
 
     """
     from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.session.file_writing import write_atomically
 
     path: Path = args.output
     if path.exists():

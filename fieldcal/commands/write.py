@@ -170,7 +170,7 @@ def _write_file(path: Path, wanted: Sequence[Change]) -> None:
         If the ending is unknown.
 
     """
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.session.file_writing import write_atomically
 
     if path.suffix in (".param", ".parm"):
         lines = [f"{c.name},{c.new:.9g}" for c in wanted]

@@ -36,7 +36,7 @@ from fieldcal.drivers.mavlink_installed import (
     replaced_at_start,
 )
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
 ENDING = ".param"

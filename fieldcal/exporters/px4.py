@@ -23,7 +23,7 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.drivers.mavlink_installed import PX4, InstalledCalibration
 from fieldcal.exporters import ExportSource
 from fieldcal.exporters.ardupilot import ArdupilotParameters, autopilot_parameters
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 WHAT = "PX4 parameters (CAL_ACC, CAL_GYRO), for QGroundControl"
 ENDING = ".params"

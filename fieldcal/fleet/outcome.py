@@ -20,10 +20,10 @@ from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.omitted_effects import with_repaired_bytes
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_prepared
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration

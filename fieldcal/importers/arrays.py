@@ -37,7 +37,8 @@ from fieldcal.importing.arrays.matlab_objects import holds_objects, object_table
 from fieldcal.importing.arrays.paired_tables import ArrayPairing, pair_arrays
 from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
 from fieldcal.importing.headings.heading import Heading
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.times.said_rate import named_scalars, stated_rate
 

@@ -23,7 +23,8 @@ from fieldcal.importing import columns
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.files.text_encoding import is_mostly_text, utf16_encoding
 from fieldcal.importing.headings.heading import Heading
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.tables.text_heading import TextHeading
 from fieldcal.importing.text.instances import ImuInstances, find_instances

@@ -26,7 +26,8 @@ from fieldcal.drivers.mavlink_installed import (
     parameter_names,
 )
 from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32
-from fieldcal.session.folder import DESCRIPTION, Session, write_atomically
+from fieldcal.session.file_writing import write_atomically
+from fieldcal.session.folder import DESCRIPTION, Session
 
 SAVED = "installed-before-"
 """What the name of a file with an old set begins with."""

@@ -9,8 +9,8 @@ from typing import Any
 
 from fieldcal.calibration import Calibration, limits
 from fieldcal.drivers.driver import Driver
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.run import plan_file
 from fieldcal.run.movers import VirtualMover
 from fieldcal.run.operator.script import ScriptOperator

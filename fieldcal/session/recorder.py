@@ -32,7 +32,8 @@ from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.samples import Block, concat
 from fieldcal.session.append_only_file import AppendOnlyFile
-from fieldcal.session.folder import DESCRIPTION, write_atomically
+from fieldcal.session.file_writing import write_atomically
+from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
 from fieldcal.session.sample_files import read_samples, samples_schema, to_record_batch

@@ -28,8 +28,8 @@ from fieldcal.core.positions import (
     WIDE_POSITIONS,
     Position,
 )
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.history.family import next_run_distribution
 from fieldcal.session import description_file
 from fieldcal.session.folder import Session

@@ -15,9 +15,9 @@ from session_folders import recorded, write_session
 from fieldcal.core import base_motion
 from fieldcal.core.base_motion import BaseMotion
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.description_file import parse_description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import earth

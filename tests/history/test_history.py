@@ -20,7 +20,8 @@ from fieldcal.cli import main
 from fieldcal.commands.history import trend_lines
 from fieldcal.commands.report import write_report
 from fieldcal.core.errors import InputError
-from fieldcal.evaluation.observations import observe, usable_windows, with_provenance
+from fieldcal.evaluation.observations import observe, with_provenance
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.history.location import default_location
 from fieldcal.history.store import History, family_runs
 from fieldcal.history.trend import parameter_trend

@@ -11,7 +11,7 @@ from laid_about import G, turned
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.text.paired_cells import PairedCells
 from fieldcal.importing.units.settled_units import settle_units
 

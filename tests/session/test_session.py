@@ -18,7 +18,7 @@ from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.session import description_file, sample_files
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults

@@ -25,12 +25,8 @@ from fieldcal.importing.headings.heading import (
     HeadingMatch,
     with_signs,
 )
-from fieldcal.importing.recording import (
-    ImuStream,
-    MeanScatter,
-    ReadOptions,
-    Recording,
-)
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import ImuStream, MeanScatter, Recording
 from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.axis_triples import unnamed_axes
 from fieldcal.importing.tables.column_choices import ask_of_choices, columns_option

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Heading
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 
 
 class ColumnSource(Protocol):

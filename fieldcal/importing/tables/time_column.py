@@ -13,7 +13,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing import columns
-from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
+from fieldcal.importing.read_options import CLOCK_NUMBER, ReadOptions
 from fieldcal.importing.tables.column_source import ColumnSource, column_numbers
 from fieldcal.importing.tables.column_times import (
     ask_rate_of_counter,

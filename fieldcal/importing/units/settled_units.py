@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Block
-from fieldcal.importing.recording import MAX_READING, ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import MAX_READING, Recording
 from fieldcal.importing.units.file_times import FIRST_ROWS, settle_time_units
 from fieldcal.importing.units.turned_axes import NamedColumns
 from fieldcal.importing.units.unit_doubts import (

@@ -13,7 +13,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.units.calm_rates import HALVED, guess_unit_of_calm_rates
 from fieldcal.importing.units.gravity_size import (
     GravityReading,

@@ -18,9 +18,9 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.model.rows import base_sway
 from fieldcal.model.rows.base_sway import find_base_sway
 from fieldcal.session import description_file

@@ -148,14 +148,8 @@ class ArrayFile(ColumnRecording):
                 f"t=time,ax=acc.0,ay=acc.1; there are {describe_tables(tables)}"
             )
 
-    def blocks(self, stream: str) -> Iterator[Block]:
+    def read_samples(self) -> Iterator[Block]:
         """Samples, some rows at a time."""
-        if len(self.imus()) > 1:
-            yield from self.alone(stream).blocks(stream)
-            return
-        yield from self.paired(self._samples())
-
-    def _samples(self) -> Iterator[Block]:
         with self._opened() as tables:
             named = self._named(tables)
             samples = columns.ColumnReader(replace(self.wanted, columns=tuple(named)))

@@ -216,14 +216,8 @@ class TextColumns(ColumnRecording):
         """Rate that a line above its numbers says."""
         return find_stated_rate(self._lines, self.wanted.separator)
 
-    def blocks(self, stream: str) -> Iterator[Block]:
+    def read_samples(self) -> Iterator[Block]:
         """Samples, a piece of the file at a time."""
-        if len(self.imus()) > 1:
-            yield from self.alone(stream).blocks(stream)
-            return
-        yield from self.paired(self._samples())
-
-    def _samples(self) -> Iterator[Block]:
         columns.check_columns(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != SKIP]

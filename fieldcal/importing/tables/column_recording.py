@@ -66,6 +66,10 @@ class ColumnRecording(Recording):
     def ask(self) -> str:
         """What to do where nothing tells its columns."""
 
+    @abstractmethod
+    def read_samples(self) -> Iterator[Block]:
+        """Samples of the one IMU in it, row by row as they stand."""
+
     def rate_said(self) -> tuple[float, str] | None:
         """Sampling rate, Hz, that the file says of itself, and where; or None."""
         return None
@@ -109,10 +113,13 @@ class ColumnRecording(Recording):
             return dict.fromkeys(self.imus_found, self.wanted)
         return self.imus_found
 
-    def paired(self, blocks: Iterator[Block]) -> Iterator[Block]:
-        """Samples of its rows, also where each holds one of two sensors alone."""
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """Samples of an IMU, also where each row holds one of two sensors alone."""
+        if len(self.imus()) > 1:
+            yield from self.alone(stream).blocks(stream)
+            return
         rows = RowsInTurn(str(self.path), self.repair)
-        for block in rows.through(blocks):
+        for block in rows.through(self.read_samples()):
             self.in_turn = rows.told
             yield block
         self.says += [s for s in rows.says if s not in self.says]

@@ -9,10 +9,7 @@ from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.wording.lines import (
-    calibration_holds,
-    format_probability,
-)
+from fieldcal.diagnosis.wording.lines import calibration_holds, format_probability
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 if TYPE_CHECKING:

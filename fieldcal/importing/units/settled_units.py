@@ -16,10 +16,7 @@ from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.recording import MAX_READING, Recording
 from fieldcal.importing.units.file_times import FIRST_ROWS, settle_time_units
 from fieldcal.importing.units.turned_axes import NamedColumns
-from fieldcal.importing.units.unit_doubts import (
-    check_format_units,
-    check_one_unit,
-)
+from fieldcal.importing.units.unit_doubts import check_format_units, check_one_unit
 from fieldcal.importing.units.unit_guess import UnitGuess
 from fieldcal.session.units import UNSCALED
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.find_device import find_device
 from fieldcal.commands.repeated_option import StoreRepeated
@@ -29,6 +29,8 @@ from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.plugins import module_names
 
 if TYPE_CHECKING:
+    from fieldcal.calibration import Calibration
+    from fieldcal.history.location import StoreLocation
     from fieldcal.run.page.server import PageServer
     from fieldcal.run.plan_file import PlanTask
 
@@ -229,20 +231,33 @@ def _run_and_show(
     with show_work(args, f"{SEARCH} the recordings of the further devices"):
         further = further_results(others, bounds, history)
     show_end_on_page(page, (found, *further.values()))
-    if args.json:
-        run_view.show_json(found, truth, further)
-    else:
-        run_view.show_results(found, folder, truth, further)
-    if not args.no_report:
-        for each in (folder, *(folder / name for name in further)):
-            report = run_view.try_write_report(each, history.place)
-            if report and not args.json:
-                sys.stdout.write(f"report:   {report}\n")
-    if not args.json:
-        run_view.show_decisions(found, further, folder)
+    _show_results(args, folder, (found, truth, further), history.place)
     try:
         check_companions(others)
     except FieldcalError as error:
         error.printed = bool(args.json)
         raise
     return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
+
+
+def _show_results(
+    args: argparse.Namespace,
+    folder: Path,
+    results: tuple[Calibration, dict[str, Any] | None, dict[str, Calibration]],
+    history: StoreLocation,
+) -> None:
+    """Print and report the result, the truth if known, and the further devices'."""
+    from fieldcal.commands import run_view
+
+    found, truth, further = results
+    if args.json:
+        run_view.show_json(found, truth, further)
+    else:
+        run_view.show_results(found, folder, truth, further)
+    if not args.no_report:
+        for each in (folder, *(folder / name for name in further)):
+            report = run_view.try_write_report(each, history)
+            if report and not args.json:
+                sys.stdout.write(f"report:   {report}\n")
+    if not args.json:
+        run_view.show_decisions(found, further, folder)

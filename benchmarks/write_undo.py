@@ -24,11 +24,8 @@ import numpy as np
 from benchmarks._words import how_many
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main as fieldcal
-from fieldcal.drivers.mavlink_installed import (
-    ARDUPILOT,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, parameter_names
 from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32
 from fieldcal.install import transaction
 from fieldcal.session import file_writing
@@ -207,6 +204,7 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
 
     with (
         mock.patch("fieldcal.commands.write.open_parameters", opened),
+        mock.patch("fieldcal.commands.autopilot.open_parameters", opened),
         mock.patch.object(transaction, "write_atomically", write_atomically),
     ):
         yield

@@ -232,7 +232,7 @@ def _write_model(
         If the file exists already.
 
     """
-    from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
+    from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, PX4
     from fieldcal.session.file_writing import write_atomically
 
     path: Path = args.output
@@ -274,14 +274,14 @@ def _install_model(
         If a session is NO-GO, or disagrees with the others.
 
     """
-    from fieldcal.commands.write import (
+    from fieldcal.commands.autopilot import (
         InstallRefused,
-        change_table,
         check_ready,
         open_parameters,
         write_parameters,
     )
-    from fieldcal.drivers.mavlink_installed import PX4
+    from fieldcal.commands.write import change_table
+    from fieldcal.drivers.mavlink_parameter_names import PX4
     from fieldcal.install.proposal import Change
     from fieldcal.install.thermal import id_names
 

@@ -26,12 +26,11 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import DiagonalCalibration, reduce_to_diagonal
 from fieldcal.calibration.names import sensor_of
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import (
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, identity_parameters
+from fieldcal.drivers.mavlink_parameter_names import (
     ARDUPILOT,
     GYRO_CAL_AT_START,
-    InstalledCalibration,
     check_number,
-    identity_parameters,
     parameter_names,
     replaced_at_start,
 )

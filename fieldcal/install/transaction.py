@@ -16,13 +16,12 @@ from typing import Any
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.mavlink_dialog import parameter_list
-from fieldcal.drivers.mavlink_installed import (
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, identity_parameters
+from fieldcal.drivers.mavlink_parameter_names import (
     ARDUPILOT,
     MOST_SENSORS,
     PX4,
-    InstalledCalibration,
     ardupilot_prefix,
-    identity_parameters,
     parameter_names,
 )
 from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32

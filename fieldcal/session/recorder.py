@@ -36,7 +36,8 @@ from fieldcal.session.file_writing import write_atomically
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
-from fieldcal.session.sample_files import read_samples, samples_schema, to_record_batch
+from fieldcal.session.sample_files import read_samples
+from fieldcal.session.sample_table import samples_schema, to_record_batch
 
 FLUSH_INTERVAL = 0.2
 """Longest time that samples are kept in memory only, s of the host's clock."""

@@ -147,7 +147,7 @@ def bench(folder: Path, taken_at: str = "2026-06-01T10:00:00Z") -> Session:
     import pyarrow as pa
     import pyarrow.parquet
 
-    from fieldcal.session.sample_files import to_record_batch
+    from fieldcal.session.sample_table import to_record_batch
 
     folder.mkdir()
     windows = [(0.0, 0.0, 5.0, 15.0), (np.pi / 4, np.radians(5.0), 25.0, 35.0)]

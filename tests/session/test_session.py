@@ -19,7 +19,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.read_options import ReadOptions
-from fieldcal.session import description_file, sample_files
+from fieldcal.session import description_file, sample_files, sample_table
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
@@ -79,7 +79,7 @@ def test_a_name_that_is_not_utf_8_is_refused_with_the_remedy(tmp_path: Path) -> 
 
 def test_every_file_kind_gives_the_same_samples(tmp_path: Path) -> None:
     wanted = block()
-    table = pa.Table.from_batches([sample_files.to_record_batch(wanted)])
+    table = pa.Table.from_batches([sample_table.to_record_batch(wanted)])
     csv = tmp_path / "a.csv"
     pa.csv.write_csv(table, csv)
     (tmp_path / "b.csv.gz").write_bytes(gzip.compress(csv.read_bytes()))

@@ -10,7 +10,8 @@ differ the means of accelerometers and gyroscopes in window i, with their biases
 c, the rotation R from one to the other, and f_i the force on the first; but for scale
 factors of some per cent. So there are two devices if each difference is steady within
 its window, and all windows have the same difference (R = 1), or the same of the
-gyroscopes, or differences that one rotation explains.
+gyroscopes, or differences that one rotation explains: also that there is none to be
+seen where the force lies along its axis.
 """
 
 from __future__ import annotations
@@ -31,13 +32,18 @@ from fieldcal.windows.alternation import (
 )
 
 MOST_SAMPLES = 500
-"""Samples of each window that are looked at."""
+"""Samples at each end of a window that are looked at."""
 
 FEWEST_WINDOWS = 2
 """Windows by which two devices are told from a vibration."""
 
-FEWEST_TURNED = 4
-"""Windows by which two devices are told by the rotation between them: three fit any."""
+FEWEST_TURNED, FEWEST_APART = 4, 3
+"""Windows by which two devices are told by the rotation between them, as three fit any;
+and those of them in which they differ."""
+
+BARELY_SEEN = 12.0
+"""Size of a difference up to which it may be missed, standard deviations of a sample:
+twice that from which it is found."""
 
 SAME_WITHIN = 0.2
 """Largest change of the difference that is none, as a share of it: scale factors change
@@ -94,17 +100,23 @@ def find_mixed_devices(
     windows : begin and end of each, s of device time; None where none was taken
 
     """
-    found = []
+    apart, alike = [], []
     for begin, end in filter(None, windows):
         first, last = np.searchsorted(block.t, (begin, end))
-        means = _steady_means(block[first:last].six)
-        if means is None:
+        if last - first < FEWEST_SAMPLES:
+            continue
+        six = block[first:last].six
+        ends = [alternating_means(part) for part in _ends(six)]
+        known = [means for means in ends if means is not None]
+        if len(known) == len(ends) and _are_the_same(known):
+            apart.append(known[0])
+        elif len(known) < len(ends) and all(map(_is_barely_seen, known)):
+            alike.append(six[:, ACC].mean(axis=0))
+        else:
             return None
-        found.append(means)
-    if len(found) < FEWEST_WINDOWS:
-        return None
-    mixed = _are_the_same(found) or _have_same_rates(found) or _are_turned(found)
-    return found[0] if mixed else None
+    everywhere = len(apart) >= FEWEST_WINDOWS and not alike
+    same = everywhere and (_are_the_same(apart) or _have_same_rates(apart))
+    return apart[0] if same or _are_turned(apart, alike) else None
 
 
 def refuse_mixed_devices(
@@ -124,19 +136,21 @@ def refuse_mixed_devices(
     if means is not None:
         raise InputError(
             "the samples of two devices come by turns, under the same names, and differ"
-            f" in the first window in {difference_text(means)}: their mean is that of"
-            " neither;"
-            f" {GIVE_EACH_A_PORT}"
+            f" in one window in {difference_text(means)}: their mean is that of"
+            f" neither; {GIVE_EACH_A_PORT}"
         )
 
 
-def _steady_means(six: Array) -> TwoMeans | None:
-    """Two means that are the same at both ends of a window; None if there are none."""
+def _ends(six: Array) -> tuple[Array, Array]:
+    """Samples at both ends of a window; all of it twice if it is short."""
     half = len(six) // 2
     size = min(MOST_SAMPLES, half if half >= FEWEST_SAMPLES else len(six))
-    ends = [alternating_means(part) for part in (six[:size], six[len(six) - size :])]
-    known = [means for means in ends if means is not None]
-    return known[0] if len(known) == len(ends) and _are_the_same(known) else None
+    return six[:size], six[len(six) - size :]
+
+
+def _is_barely_seen(means: TwoMeans) -> bool:
+    """Whether a difference is so small that it may be missed at the other end."""
+    return bool(np.linalg.norm(means.apart / means.noise) < BARELY_SEEN)
 
 
 def _differences(found: Sequence[TwoMeans], outputs: slice) -> Array:
@@ -164,11 +178,17 @@ def _are_known(found: Sequence[TwoMeans], outputs: slice) -> bool:
     return bool((np.array([m.error for m in found]) <= KNOWN_TO * sizes).all())
 
 
-def _are_turned(found: Sequence[TwoMeans]) -> bool:
-    """Whether one rotation and biases explain the forces of all windows, (1)."""
-    if len(found) < FEWEST_TURNED or not _are_known(found, ACC):
+def _are_turned(apart: Sequence[TwoMeans], alike: Sequence[Array]) -> bool:
+    """Whether one rotation and biases explain the forces of all windows, (1).
+
+    `alike` are forces, (3,) m/s^2, that both devices measured alike: along the axis by
+    which one is turned against the other.
+    """
+    few = len(apart) < FEWEST_APART or len(apart) + len(alike) < FEWEST_TURNED
+    if few or not _are_known(apart, ACC):
         return False
-    pairs = np.array([[means.one[ACC], means.other[ACC]] for means in found])
+    seen = [[means.one[ACC], means.other[ACC]] for means in apart]
+    pairs = np.array([*seen, *([force, force] for force in alike)])
     size = np.linalg.norm(pairs[:, 0] - pairs[:, 1], axis=1)
     begins = product((False, True), repeat=FEWEST_TURNED - 1)
     off = min(_off_one_rotation(pairs, (False, *begin)) for begin in begins)

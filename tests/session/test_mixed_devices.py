@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.session.mixed_devices import find_mixed_devices, refuse_mixed_devices
+from fieldcal.windows.alternation import alternating_means
 
 RATE, SECONDS, WINDOWS = 100.0, 20.0, 4
 LADDER = (0.0, 45.0, -45.0, 20.0, -70.0)
@@ -78,6 +79,34 @@ def test_two_devices_at_an_angle_are_refused(angle_deg: float) -> None:
         block, windows = turned(angle_deg, seed)
         assert find_mixed_devices(block, windows) is not None, seed
         assert find_mixed_devices(block, windows[:2]) is not None, "by the gyroscopes"
+
+
+def test_two_devices_turned_about_the_vertical_look_alike_in_one_position() -> None:
+    """Good ones: their biases are no larger than their noise."""
+    rng = np.random.default_rng(2)
+    n = int(RATE * SECONDS)
+    tilt = np.deg2rad(np.repeat(LADDER, n))
+    one = 9.81 * np.column_stack([np.sin(tilt), -np.cos(tilt), 0 * tilt])
+    other = one[:, [2, 1, 0]] * [-1, 1, 1]  # a quarter turn about y
+    acc = np.where(np.arange(len(tilt))[:, None] % 2, one, other + [1e-3, 0, -1e-3])
+    acc += 2e-3 * rng.standard_normal(acc.shape)
+    gyr = 3e-5 * rng.standard_normal(acc.shape)
+    block = Block.of(np.arange(len(acc)) / RATE, acc, gyr)
+    starts = SECONDS * np.arange(len(LADDER))
+    windows = [(float(s) + 1, float(s) + SECONDS - 1) for s in starts]
+    assert alternating_means(block.between(*windows[0]).six) is None
+    assert find_mixed_devices(block, windows) is not None
+    assert find_mixed_devices(block, windows[:3]) is None, (
+        "two differ, of which any may"
+    )
+
+
+def test_a_vibration_in_some_windows_is_no_second_device() -> None:
+    """Where the others stand still, no rotation explains it."""
+    n = int(RATE * SECONDS)
+    shaken = (-1.0) ** np.arange(n * WINDOWS)[:, None] * APART
+    shaken[n : 2 * n] = 0.0
+    assert find_mixed_devices(*recording(shaken)) is None
 
 
 def test_two_accelerometers_at_an_angle_are_told_by_the_rotation() -> None:

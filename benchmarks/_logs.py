@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import Block
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.session.recorder import Recorder
 
 ROWS = 100_000

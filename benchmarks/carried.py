@@ -22,8 +22,8 @@ from benchmarks.concealed.sessions import Session as Played
 from benchmarks.concealed.sessions import plain
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 
 USUAL, SEED = 120, 83_000_000

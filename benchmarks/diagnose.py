@@ -18,7 +18,7 @@ from time import perf_counter
 
 import numpy as np
 
-from fieldcal.session.sample_files import to_record_batch
+from fieldcal.session.sample_table import to_record_batch
 from fieldcal.sim_device.profile import Profile, Sampling
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import checked_effect

@@ -36,7 +36,7 @@ from fieldcal.fleet.workers import process_pool
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
-from fieldcal.session.sample_files import to_record_batch
+from fieldcal.session.sample_table import to_record_batch
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import Profile, Truth
 from fieldcal.sim_device.replay import simulate

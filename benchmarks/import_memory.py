@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks._logs import RATE, dataflash, samples, ulog
 from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.session.ingest import import_stream
 
 HOURS = (1, 4)

@@ -22,7 +22,7 @@ from time import process_time
 from benchmarks._logs import COLUMNS, ROWS, Log, samples, write_all, write_tables
 from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.session.ingest import import_stream
 
 RUNS = 5

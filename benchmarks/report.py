@@ -18,7 +18,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.report import gather, render
 from fieldcal.report.browser import Browser, find_browser
 from fieldcal.session.folder import Session
-from fieldcal.session.sample_files import to_record_batch
+from fieldcal.session.sample_table import to_record_batch
 
 RATE, SECONDS, TURN = 1000, 3600, 4.0
 GRAVITY = 9.81

@@ -24,14 +24,11 @@ import numpy as np
 from benchmarks._words import how_many
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main as fieldcal
-from fieldcal.drivers.mavlink_installed import (
-    ARDUPILOT,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, parameter_names
 from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32
 from fieldcal.install import transaction
-from fieldcal.session import folder
+from fieldcal.session import file_writing
 from fieldcal.sim_device.autopilot import Autopilot
 
 TRIALS = 1000
@@ -197,7 +194,7 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
         clock = lambda: vehicle.now  # noqa: E731
         return ParameterLink("virtual", vehicle.connect, clock, vehicle.pause)
 
-    written = folder.write_atomically
+    written = file_writing.write_atomically
 
     def write_atomically(path: Path, content: str | bytes) -> Path:
         vehicle.step()
@@ -207,6 +204,7 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
 
     with (
         mock.patch("fieldcal.commands.write.open_parameters", opened),
+        mock.patch("fieldcal.commands.autopilot.open_parameters", opened),
         mock.patch.object(transaction, "write_atomically", write_atomically),
     ):
         yield

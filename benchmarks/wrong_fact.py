@@ -23,8 +23,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 

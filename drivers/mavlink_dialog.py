@@ -17,12 +17,8 @@ from math import inf
 from typing import Any
 
 from fieldcal.core.errors import DeviceError
-from fieldcal.drivers.mavlink_installed import (
-    PX4,
-    InstalledCalibration,
-    identity_parameters,
-    other_processing_parameters,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, identity_parameters
+from fieldcal.drivers.mavlink_parameter_names import PX4, other_processing_parameters
 from fieldcal.drivers.mavlink_watch import STABLE_ROUNDS, InstalledWatch, is_unchanged
 
 HEARTBEAT_INTERVAL = 1.0

@@ -27,8 +27,8 @@ from fieldcal.drivers.mavlink_dialog import (
     REAL32,
     parameter_list,
 )
-from fieldcal.drivers.mavlink_installed import PX4
 from fieldcal.drivers.mavlink_link import TwoWaySource, endpoint_opener
+from fieldcal.drivers.mavlink_parameter_names import PX4
 from fieldcal.drivers.options import split_address
 
 HEARTBEAT_INTERVAL, PATIENCE = 1.0, 0.7

@@ -27,7 +27,7 @@ from fieldcal.drivers.mavlink_frames import (
     padded_payloads,
     read_headers,
 )
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, PX4
 from fieldcal.drivers.mavlink_units import (
     ACCELERATIONS,
     RATES,

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import parameter_names
 
 STABLE_ROUNDS = 2
 """Successive rounds that must agree after a restart."""

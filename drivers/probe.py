@@ -10,15 +10,18 @@ from fieldcal.core.errors import DeviceError
 from fieldcal.drivers.codec import (
     FormatMatch,
     codec_class,
+    open_codec,
     recognise_format,
     wire_formats,
 )
 from fieldcal.drivers.column_guess import describe_lines
 from fieldcal.drivers.mavlink_detection import detect_autopilot
 from fieldcal.drivers.named_guess import NameReader, guess_named_options
+from fieldcal.drivers.options import Options
 from fieldcal.drivers.protocols.text import TextCodec
 from fieldcal.drivers.reader import ByteSource
 from fieldcal.drivers.serial_imu import open_port
+from fieldcal.session.mixed_devices import GIVE_EACH_A_PORT, mixed_samples_text
 
 SILENT_RATES = 2
 """Baud rates at which not a byte came, after which there is no device."""
@@ -29,8 +32,8 @@ UNKNOWN_GYRO_UNIT = (
 )
 """What is said of lines whose rates may be in either unit."""
 
-ENOUGH_BYTES = 4000
-"""Bytes after which a format shows."""
+ENOUGH_BYTES = 6000
+"""Bytes after which a format shows, and so do two devices: 50 of the longest frames."""
 
 
 OLD_BYTE_DELAY, LONGEST_OLD_READ = 0.003, 0.3
@@ -127,6 +130,7 @@ def _identify(
         says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
         if "gx" in query and "gyr_unit" not in query:
             says += UNKNOWN_GYRO_UNIT
+        says += _two_devices(name, like.query, data)
         return DetectedDevice(port, url, name, baud, rate, says)
     if heard := detect_autopilot(data):
         query = f"&{heard.query}" if heard.query else ""
@@ -137,6 +141,14 @@ def _identify(
         says = f"an autopilot (MAVLink) at {baud} baud, which sends {sends}"
         return DetectedDevice(port, url, "mavlink", baud, rate, says)
     return None
+
+
+def _two_devices(name: str, query: str, data: bytes) -> str:
+    """What to say if two devices send these bytes; empty if one does."""
+    declared = f"{query}&rate=1" if query else "rate=1"
+    block = open_codec(name, Options("probe", declared)).feed(data, 0.0)
+    said = "" if block is None else mixed_samples_text(block.six)
+    return f"; {said}: {GIVE_EACH_A_PORT}" if said else ""
 
 
 def _recognise_names(

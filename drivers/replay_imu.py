@@ -25,7 +25,7 @@ from fieldcal.drivers.codec import open_codec
 from fieldcal.drivers.driver import Driver, LinkHealth
 from fieldcal.drivers.options import Options, split_address
 from fieldcal.drivers.playback import PlaybackClock, playback_speed
-from fieldcal.evaluation.observations import reported_grain
+from fieldcal.evaluation.usable_windows import reported_grain
 from fieldcal.session.folder import Session
 from fieldcal.session.sample_files import ENDINGS, read_samples
 

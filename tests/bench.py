@@ -12,7 +12,7 @@ import pyarrow.parquet
 import tomlkit
 
 from fieldcal.core.positions import FIVE_POSITIONS
-from fieldcal.session.sample_files import to_record_batch
+from fieldcal.session.sample_table import to_record_batch
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import checked_effect

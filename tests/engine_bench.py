@@ -14,13 +14,13 @@ from fieldcal.planning.steps import Hold, Plan
 from fieldcal.run.engine import Engine
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.wait_reason import WaitReason, reminder
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device.in_process import InProcess
 from fieldcal.windows import Average
 
-ABOUT = description.parse_description(
+ABOUT = description_file.parse_description(
     {"site": {"latitude_deg": 50.45, "height_m": 170.0}}
 )
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.session.joining import join_files
 from fieldcal.importing.times.row_validator import RowValidator
-from fieldcal.importing.units.unit_guess import settle_units
+from fieldcal.importing.units.settled_units import settle_units
 
 
 def read_files(paths: Sequence[str | Path]) -> tuple[Block, list[str]]:

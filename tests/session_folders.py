@@ -11,7 +11,7 @@ import pyarrow as pa
 import tomlkit
 
 from fieldcal.core.samples import Block
-from fieldcal.session.sample_files import to_record_batch
+from fieldcal.session.sample_table import to_record_batch
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.sim_device.vocabulary import checked_effect

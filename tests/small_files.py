@@ -14,7 +14,7 @@ from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulo
 
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session.folder import Session
 

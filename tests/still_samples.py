@@ -9,7 +9,8 @@ import numpy as np
 from fieldcal.core.samples import Block
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import Description, parse_description
+from fieldcal.session.description import Description
+from fieldcal.session.description_file import parse_description
 
 RATE, G = 50.0, 9.8
 FORCE = {0.0: (0.0, -G, 0.0), 90.0: (-G, 0.0, 0.0)}

@@ -30,7 +30,7 @@ from fieldcal.navigator.mistakes import (
     run_mistake_name,
 )
 from fieldcal.navigator.session_runs import calibrate_navigator
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 STATED_LEVEL_DEG = 0.02
 """What `drifting` says of the base."""
@@ -67,7 +67,7 @@ class NavigatorRuns:
             record(folder, self.sensors, rng, tilt_deg=self.tilt_deg, **self.how)
             start = time.perf_counter()
             found = calibrate_navigator(
-                folder, description.read_description(folder / "session.toml")
+                folder, description_file.read_description(folder / "session.toml")
             )
             seconds = time.perf_counter() - start
         named = {

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.description import Description
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
@@ -139,7 +139,7 @@ class Session:
         truth, off = self.profile.truth, self.off
         positions = [self._told(w) for w in self.windows]
         site = self.profile.site
-        return description.parse_description(
+        return description_file.parse_description(
             {
                 "format": 1,
                 "device": {"name": "concealed", "grade": self.profile.device.grade},

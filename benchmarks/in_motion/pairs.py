@@ -14,7 +14,7 @@ from fieldcal.against import Match
 from fieldcal.against.motion import compare_in_motion
 from fieldcal.against.result import RealAndSimulated
 from fieldcal.core.samples import Array, Block
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 SECONDS, HZ = 60.0, 25.0
 WHITE = np.repeat([0.02, 1e-3], 3)
@@ -27,7 +27,7 @@ KINDS = (
     "", "lever_arm", "g_sensitivity", "time_delay", "cubic", "bandwidth",
     "second_order", "stamp_error", "increments", "flexible_mount",
 )  # fmt: skip
-ABOUT = description.parse_description({"format": 1})
+ABOUT = description_file.parse_description({"format": 1})
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,9 @@ from fieldcal.core.frames import angles_of_force_direction
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.session.ingest import import_stream
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 
@@ -120,7 +120,7 @@ def _told(held: Held) -> Made:
 
 def _said(positions: Sequence[Mapping[str, Any]]) -> Description:
     tables = [dict(p) for p in positions]
-    return description.parse_description(
+    return description_file.parse_description(
         {"format": 1, "site": SITE, "position": tables}
     )
 

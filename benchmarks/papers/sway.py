@@ -21,8 +21,8 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import profile as device

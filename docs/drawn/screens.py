@@ -30,7 +30,7 @@ from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
 from fieldcal.run.wait_reason import WaitReason
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.in_process import InProcess
@@ -116,7 +116,7 @@ def screens() -> dict[str, str]:
     operator = Filmed(driver)
     with TemporaryDirectory() as place:
         folder = Path(place) / "first"
-        about = description.parse_description(TABLES)
+        about = description_file.parse_description(TABLES)
         with Recorder(folder, TABLES) as recorder:
             found = Engine(driver, operator, about, recorder).run(plan(about))
         history = History(Path(place) / "history.sqlite")

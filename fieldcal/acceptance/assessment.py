@@ -39,7 +39,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.sentences import join_words
-from fieldcal.evaluation.observations import UsableWindows, angle_setting
+from fieldcal.evaluation.observations import angle_setting
+from fieldcal.evaluation.usable_windows import UsableWindows
 from fieldcal.history.store import History, HistoryRun, earlier_runs, family_runs
 from fieldcal.session.folder import Session
 from fieldcal.session.installed_calibration import subtracts_gyro_offset

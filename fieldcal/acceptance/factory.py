@@ -22,6 +22,9 @@ from fieldcal.session.description import Description
 DEG_H = math.radians(1) / 3600
 """rad/s of one degree an hour."""
 
+SourceOfSize = Callable[..., str]
+"""From the name of an error, and the size that is stated for it, to who says it."""
+
 
 def factory_errors_used(calibration: Calibration) -> FactoryErrors:
     """Sizes of factory errors that a result was made with, from its `info`."""
@@ -57,7 +60,18 @@ def _factory_checks(
             return "as stated"
         return of_grade if size == by_grade else "as the recording shows"
 
-    if left.cross_coupling and "acc" in measured:
+    if "acc" in measured:
+        yield from _accelerometer_checks(left, about, whose)
+    if "gyr" in measured:
+        yield from _gyroscope_checks(left, about, whose)
+    yield from _warm_up_check(left, measured, whose)
+
+
+def _accelerometer_checks(
+    left: FactoryErrors, about: Description, whose: SourceOfSize
+) -> Iterator[Check]:
+    """Report the assumed errors of the accelerometers."""
+    if left.cross_coupling:
         by = whose("cross_coupling", about.squareness)
         says = (
             f"this relies on axes that are square to ± {100 * left.cross_coupling:.2g}"
@@ -65,7 +79,7 @@ def _factory_checks(
             " cross-coupling from nine positions or more (--cross)"
         )
         yield Check("cross-coupling", None, says)
-    if left.quadratic and "acc" in measured:
+    if left.quadratic:
         by = whose("quadratic", about.quadratic)
         size = 1e3 * left.quadratic * G0
         says = (
@@ -74,14 +88,20 @@ def _factory_checks(
             " includes both"
         )
         yield Check("linearity", None, says)
-    if left.hysteresis and "acc" in measured:
+    if left.hysteresis:
         says = (
             "this relies on accelerometers with a hysteresis of 0 ±"
             f" {1e3 * left.hysteresis / G0:.2g} mg, {whose('hysteresis')}; each ±"
             " includes it"
         )
         yield Check("hysteresis", None, says)
-    if left.g_sensitivity and "gyr" in measured:
+
+
+def _gyroscope_checks(
+    left: FactoryErrors, about: Description, whose: SourceOfSize
+) -> Iterator[Check]:
+    """Report the assumed errors of the gyroscopes."""
+    if left.g_sensitivity:
         by = whose("g_sensitivity", about.g_sensitivity)
         felt = float(f"{left.g_sensitivity * G0 / DEG_H:.2g}")  # 180, and not 1.8e+02
         says = (
@@ -90,11 +110,10 @@ def _factory_checks(
             " state it, and hold each axis up and down"
         )
         yield Check("g-sensitivity", None, says)
-    yield from _warm_up_check(left, measured, whose)
 
 
 def _warm_up_check(
-    left: FactoryErrors, measured: set[str], whose: Callable[[str], str]
+    left: FactoryErrors, measured: set[str], whose: SourceOfSize
 ) -> Iterator[Check]:
     """Report the assumed change of biases while the device warms up."""
     sizes = {

@@ -20,7 +20,7 @@ from fieldcal.against.wording import DIRECTION_WORDS, difference_with_parameters
 from fieldcal.core.errors import InputError
 from fieldcal.core.escaping import escape_invisible
 from fieldcal.effects import catalogue
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 PREDICTION = "chi2_per_dof"
 

@@ -16,9 +16,10 @@ from tempfile import TemporaryDirectory
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import Recording
 from fieldcal.importing.session.ingest import import_stream
-from fieldcal.importing.units.unit_guess import settle_units
+from fieldcal.importing.units.settled_units import settle_units
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 

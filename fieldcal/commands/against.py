@@ -83,16 +83,18 @@ def _comparison_method(args: argparse.Namespace, session: Session) -> CompareOut
     from fieldcal.against.motion.held import holds_positions
     from fieldcal.against.opening import open_simulator_output
     from fieldcal.against.side import diagnose_side
+    from fieldcal.commands.progress import SEARCH, show_work
 
     if args.motion or not holds_positions(session.block, session.about):
         return partial(_compare_by_motion, args, session)
-    real = diagnose_side(str(args.session), session.block, session.about)
+    with show_work(args, f"{SEARCH} {args.session}"):
+        real = diagnose_side(str(args.session), session.block, session.about)
 
     def by_positions(path: Path) -> tuple[Match, list[str]]:
         block, about, said = open_simulator_output(path, (session.block, session.about))
-        return compare_sides(
-            real, diagnose_side(args.against, block, about, real)
-        ), list(said)
+        with show_work(args, f"{SEARCH} {path}"):
+            simulated = diagnose_side(args.against, block, about, real)
+            return compare_sides(real, simulated), list(said)
 
     return by_positions
 
@@ -104,11 +106,14 @@ def _compare_by_motion(
     from fieldcal.against.motion import compare_in_motion
     from fieldcal.against.opening import read_output
     from fieldcal.against.sensor_model import CALIBRATION
+    from fieldcal.commands.progress import SEARCH, show_work
 
     read = read_output(path)
-    found = compare_in_motion(
-        (session.block, session.about), read.block, (str(args.session), args.against)
-    )
+    recorded = (session.block, session.about)
+    with show_work(args, f"{SEARCH} how {args.session} and {path} differ"):
+        found = compare_in_motion(
+            recorded, read.block, (str(args.session), args.against)
+        )
     said = list(read.says)
     if args.patch and any(d.id in CALIBRATION for d in found.differences):
         said.append(

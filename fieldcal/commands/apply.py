@@ -101,7 +101,7 @@ def _write_samples(path: Path, block: Block) -> None:
     from pyarrow import csv, parquet
 
     from fieldcal.core.errors import InputError, disk_says
-    from fieldcal.session.sample_files import to_record_batch
+    from fieldcal.session.sample_table import to_record_batch
 
     table = pa.Table.from_batches([to_record_batch(block)])
     part = path.with_name(f".{path.name}.{os.getpid()}")

@@ -9,11 +9,9 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.escaping import escape_line
 
 if TYPE_CHECKING:
     from fieldcal.fleet.batch import SessionBatch
@@ -28,9 +26,6 @@ EXAMPLE = """\
   fieldcal batch archive --jobs 8 -o march.parquet
   fieldcal batch /net/archive --scheduler tcp://10.0.0.5:8786
 """
-
-NOTE_INTERVAL = 60.0
-"""Time between lines about the progress where no bar can be drawn, s."""
 
 DEFAULT_TABLE = "batch.parquet"
 
@@ -67,12 +62,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; 0 if all are good, 1 if some are not or have no result."""
     from fieldcal.calibration.limits import check_every_grade
+    from fieldcal.commands.progress import process_with_progress
     from fieldcal.fleet.batch import SessionBatch
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
-    from fieldcal.session.folder import check_writable
+    from fieldcal.history.repeats import copy_sentence
+    from fieldcal.session.file_writing import check_writable
 
     check_writable(args.output)
     if args.limits:
@@ -89,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
         with worker_pool(args) as pool:
             process_with_progress(batch, left, pool)
     batch.write(args.output)
+    for pair in batch.shorter_copies():
+        sys.stderr.write(f"fieldcal batch: {copy_sentence(*pair)}\n")
     return _print_summary(args, batch, len(left))
 
 
@@ -111,44 +110,6 @@ def worker_pool(args: argparse.Namespace) -> Iterator[WorkerPool]:
             yield pool
     else:
         yield process_pool(args.jobs or os.cpu_count() or 1, ["fieldcal.fleet.outcome"])
-
-
-def process_with_progress(
-    batch: SessionBatch, left: list[str], pool: WorkerPool
-) -> None:
-    """Process the folders `left`, with a bar that shows rate and remaining time.
-
-    In a log file, where a bar cannot be drawn, a line tells them now and then.
-    """
-    from rich import progress
-
-    from fieldcal.commands.console import EscapingConsole
-
-    bar = progress.Progress(
-        progress.BarColumn(),
-        progress.MofNCompleteColumn(),
-        progress.TextColumn("{task.fields[rate]}"),
-        progress.TimeRemainingColumn(),
-        console=EscapingConsole(stderr=True),
-        transient=True,
-    )
-    with bar, contextlib.closing(batch.process(left, pool)) as done:
-        task = bar.add_task("", total=len(left), rate="")
-        begun = noted = monotonic()
-        for number, one in enumerate(done, 1):
-            bar.update(task, advance=1)
-            speed = bar.tasks[0].speed
-            if speed:
-                bar.update(task, rate=f"{60 * speed:.3g} a minute")
-            if one.error:
-                bar.console.print(escape_line(one.error), soft_wrap=True)
-            now = monotonic()
-            if not bar.console.is_terminal and now - noted >= NOTE_INTERVAL:
-                noted, each = now, (now - begun) / number / 60
-                bar.console.print(
-                    f"{number} of {len(left)} sessions done,"
-                    f" about {each * (len(left) - number):.0f} min left"
-                )
 
 
 def _print_summary(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:

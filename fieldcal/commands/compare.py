@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 def _compare_instances(args: argparse.Namespace) -> int:
     """Compare the IMUs of one log with each other and with gravity."""
     from fieldcal.evaluation.instances import compare_instances
-    from fieldcal.evaluation.observations import usable_windows
+    from fieldcal.evaluation.usable_windows import usable_windows
     from fieldcal.session.folder import Session
 
     folders = _session_folders(args.paths)

@@ -134,17 +134,20 @@ def run(args: argparse.Namespace) -> int:
 
 def _diagnose_session(args: argparse.Namespace) -> int:
     """Diagnose one session and write the diagnosis."""
+    from fieldcal.commands.progress import SEARCH, show_work
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare_recording
     from fieldcal.diagnosis.verdict import make_diagnosis
     from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
-    explanation = explain(prepare_recording(session.block, session.about))
-    found = make_diagnosis(session.block, explanation)
-    again = (
-        _replay_on_twin(args.twin, session, explanation, found) if args.twin else None
-    )
+    with show_work(args, f"{SEARCH} {args.session}"):
+        explanation = explain(prepare_recording(session.block, session.about))
+        found = make_diagnosis(session.block, explanation)
+    again = None
+    if args.twin:
+        with show_work(args, f"replaying {args.session} on its twin"):
+            again = _replay_on_twin(args.twin, session, explanation, found)
     if again is not None:
         found = replace(found, says=f"{found.says} {again.says}")
     content = found.to_json()
@@ -176,7 +179,7 @@ def _replay_on_twin(
 ) -> ReplayResult:
     """Replay the session on its twin, and write the twin's device file."""
     from fieldcal.diagnosis.findings.quality import fit_recorded_samples
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.session.file_writing import write_atomically
     from fieldcal.sim_device.profile_file import to_toml
     from fieldcal.twin import replay_session
 

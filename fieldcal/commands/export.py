@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def number_of_sensor(text: str) -> int:
     """Number of a sensor, from 0."""
-    from fieldcal.drivers.mavlink_installed import MOST_SENSORS
+    from fieldcal.drivers.mavlink_parameter_names import MOST_SENSORS
 
     last = MOST_SENSORS - 1
     if not text.isdecimal() or int(text) > last:

@@ -70,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.core.errors import InputError
     from fieldcal.history.location import default_location
+    from fieldcal.history.repeats import copy_sentence, shorter_copies
     from fieldcal.history.store import History
 
     history = History(args.history or default_location())
@@ -84,6 +85,9 @@ def run(args: argparse.Namespace) -> int:
             f"{history.database.location_text} has no calibration of {args.serial}; it"
             f" has {known}"
         )
+    wanted = {"serial": args.serial}
+    for pair in history.database.run(lambda db: shorter_copies(db, wanted)):
+        sys.stderr.write(f"fieldcal history: {copy_sentence(*pair)}\n")
     if args.compare:
         return _compare_runs(args, runs)
     return _show_trends(args, runs)

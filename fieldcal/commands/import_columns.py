@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fieldcal.importing.recording import ReadOptions
+    from fieldcal.importing.read_options import ReadOptions
 
 
 def add_column_options(parser: argparse.ArgumentParser) -> None:
@@ -54,7 +54,7 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
 
 def read_options(args: argparse.Namespace, i: int) -> ReadOptions:
     """Options for reading the i-th file."""
-    from fieldcal.importing.recording import ReadOptions
+    from fieldcal.importing.read_options import ReadOptions
 
     given = args.columns[min(i, len(args.columns) - 1)] if args.columns else ""
     columns = [name.strip() for name in given.split(",")] if given else []

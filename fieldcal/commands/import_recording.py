@@ -8,22 +8,18 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from shutil import rmtree
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fieldcal.commands.import_columns import add_column_options, read_options
-from fieldcal.commands.site import add_site_options, site_tables
+from fieldcal.commands.import_imu import import_imu, report_instances
+from fieldcal.commands.site import add_site_options
 from fieldcal.core.errors import InputError
 from fieldcal.core.escaping import escape_line
 from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.gravity import G0
 
 if TYPE_CHECKING:
-    from fieldcal.core.samples import Array
-    from fieldcal.importing.recording import (
-        ImuStream,
-        MeanScatter,
-        Recording,
-    )
+    from fieldcal.importing.recording import ImuStream, Recording
     from fieldcal.importing.session.ingest import ImportedSession
 
 RARE = (
@@ -190,11 +186,11 @@ def _import_streams(
         # each IMU of the file has its own messages
         one = recording.alone(stream.name)
         there = folder / inner[stream.name] if len(names) > 1 else folder
-        imported[stream.name] = _import_stream(args, one, stream, there)
+        imported[stream.name] = import_imu(args, one, stream, there)
         written.append(there)
     if len(names) > 1:
         rests = {name: one.forces for name, one in imported.items()}
-        _report_instances(folder, rests, float(args.gravity or G0))
+        report_instances(folder, rests, float(args.gravity or G0))
     return list(imported.values())
 
 
@@ -231,98 +227,3 @@ def _selected_streams(recording: Recording, wanted: list[str]) -> list[ImuStream
                 f"{recording.path}: has no {name}; there are {', '.join(there)}"
             )
     return [there[name] for name in wanted or there]
-
-
-def _import_stream(
-    args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
-) -> ImportedSession:
-    from fieldcal.importing.session.ingest import import_stream
-    from fieldcal.importing.units.unit_guess import settle_units
-    from fieldcal.session.units import UNSCALED
-
-    name = recording.path.name.split(".")[0]
-    about: dict[str, Any] = {"format": 1, **site_tables(args, name)}
-    units = {"acceleration": args.acc_unit, "angular_rate": args.gyr_unit}
-    if kept := {k: u for k, u in units.items() if u in UNSCALED}:
-        about["units"] = kept
-    if args.rate and recording.wanted.rate_hz:
-        about["sampling"] = {"rate_hz": args.rate}
-    guessed, bias = settle_units(recording, stream.name)
-    if bias:
-        about["nominal"] = {"acc_bias": bias}
-    if guessed:
-        about["guessed"] = guessed
-        stream = next(s for s in recording.streams() if s.name == stream.name)
-    if (scatter := recording.scatter()) is not None:
-        return _import_means(args, recording, stream, folder, about, scatter)
-    imported = import_stream(recording, stream.name, folder, about, args.still)
-    err = sys.stderr.write
-    err(
-        f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"
-        f" {_counted(len(imported.rests), 'still stretch', 'es')}"
-        f" of {args.still:g} s or more\n"
-    )
-    for what, why in guessed.items():
-        err(f"{folder}: {what.replace('_', ' ')} taken as {why}\n")
-    for sentence in imported.says:
-        err(f"{folder}: {sentence}\n")
-    if imported.facts.left_out:
-        err(f"{folder}: left out: {_counted(imported.facts.left_out, 'row', 's')}\n")
-    if not imported.rests and kept:
-        err(
-            f"nothing says what a {' or '.join(sorted(set(kept.values())))} is worth,"
-            " so no still stretch was found: say how many make a g or deg/s, such as"
-            " --acc-unit g --acc-lsb 2048 --gyr-unit deg/s --gyr-lsb 16.4, or write"
-            " [nominal] scale factors and the positions into session.toml\n"
-        )
-    elif not imported.rests:
-        shorter = ", or try --still with a shorter time" if args.still > 1 else ""
-        err(f"write the positions into session.toml{shorter}\n")
-    sys.stdout.write(f"{folder}\n")
-    return imported
-
-
-def _import_means(
-    args: argparse.Namespace,
-    recording: Recording,
-    stream: ImuStream,
-    folder: Path,
-    about: dict[str, Any],
-    scatter: MeanScatter,
-) -> ImportedSession:
-    """Make a session of a table of means."""
-    from fieldcal.importing.session.ingest import import_stream
-    from fieldcal.importing.tables.means import tables_of_means
-
-    gravity = float(about["site"].get("gravity", G0))
-    tables = tables_of_means(recording, stream.name, scatter, gravity, args.sigma)
-    guessed = about.pop("guessed", {}) | tables.pop("guessed", {})
-    about |= {"guessed": guessed} if guessed else {}
-    never = float("inf")
-    imported = import_stream(recording, stream.name, folder, about | tables, never)
-    err = sys.stderr.write
-    err(
-        f"{folder}: {stream.name}, {stream.says}:"
-        f" {_counted(imported.facts.rows, 'position', 's')}, means only: nothing that"
-        " goes on within a position or between two can be found\n"
-    )
-    for what, why in guessed.items():
-        err(f"{folder}: {what.replace('_', ' ')} taken as {why}\n")
-    for sentence in imported.says:
-        err(f"{folder}: {sentence}\n")
-    sys.stdout.write(f"{folder}\n")
-    return imported
-
-
-def _report_instances(folder: Path, rests: dict[str, Array], gravity: float) -> None:
-    """Report which of several IMUs in one log disagrees with the others."""
-    from fieldcal.evaluation.instances import compare_instances
-
-    found = compare_instances(rests, gravity)
-    for one in found if any(one.out for one in found) else []:
-        sys.stderr.write(f"{folder}: {one.sentence()}\n")
-
-
-def _counted(number: int, what: str, ending: str) -> str:
-    """Number with a noun, in the plural unless it is 1."""
-    return f"{number} {what}{ending if number != 1 else ''}"

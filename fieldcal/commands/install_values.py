@@ -81,7 +81,8 @@ def check_same_installed(calibration: Calibration, session: Session) -> None:
 
 def _effective_parameters(known: InstalledCalibration) -> dict[str, float]:
     """Parameters by which the autopilot corrected the samples."""
-    from fieldcal.drivers.mavlink_installed import identity_parameters, parameter_names
+    from fieldcal.drivers.mavlink_installed import identity_parameters
+    from fieldcal.drivers.mavlink_parameter_names import parameter_names
 
     of_it = sum(parameter_names(known.autopilot, known.instance).values(), start=())
     had = {name: value for name, value in known.values.items() if name in of_it}

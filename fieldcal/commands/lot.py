@@ -65,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.history import filters, sessions
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
+    from fieldcal.history.repeats import copy_sentence, shorter_copies
 
     if not 0 < args.fdr < 1:
         raise InputError(f"--fdr {args.fdr:g}: give a share between 0 and 1")
@@ -73,12 +74,14 @@ def run(args: argparse.Namespace) -> int:
     some = database.run(lambda db: sessions.find_sessions(db, wanted, once=True))
     if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
         sys.stderr.write(f"fieldcal lot: {lost}\n")
+    for pair in database.run(lambda db: shorter_copies(db, wanted)):
+        sys.stderr.write(f"fieldcal lot: {copy_sentence(*pair)}\n")
     if not some:
         raise InputError(_why_none(database, wanted))
     found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)
     if args.report:
         from fieldcal.report.lot_page import render_lot_page
-        from fieldcal.session.folder import write_atomically
+        from fieldcal.session.file_writing import write_atomically
 
         write_atomically(
             args.report, render_lot_page(found, " ".join(args.query) or "everything")

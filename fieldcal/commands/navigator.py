@@ -24,10 +24,11 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.table import show_calibration
     from fieldcal.navigator.session_runs import calibrate_navigator
-    from fieldcal.session import description
-    from fieldcal.session.folder import DESCRIPTION, RESULT, write_atomically
+    from fieldcal.session import description_file
+    from fieldcal.session.file_writing import write_atomically
+    from fieldcal.session.folder import DESCRIPTION, RESULT
 
-    about = description.read_description(args.session / DESCRIPTION)
+    about = description_file.read_description(args.session / DESCRIPTION)
     found = calibrate_navigator(args.session, about)
     text = json.dumps(found.to_json(), allow_nan=False)
     path = write_atomically(args.session / RESULT, text + "\n")

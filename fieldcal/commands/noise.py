@@ -63,7 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.session.folder import check_writable
+    from fieldcal.commands.progress import show_work
+    from fieldcal.session.file_writing import check_writable
     from fieldcal.session.noise_file import NOISE
 
     if args.report:
@@ -74,9 +75,10 @@ def run(args: argparse.Namespace) -> int:
             _open_session(path, Path(place) / str(i))
             for i, path in enumerate(args.sessions)
         ]
-        found = noise_result(
-            sessions, args.limits, args.history, [str(p) for p in args.sessions]
-        )
+        _check_other_samples(args.sessions, sessions)
+        names = [str(path) for path in args.sessions]
+        with show_work(args, f"estimating the noise of {', '.join(names)}"):
+            found = noise_result(sessions, args.limits, args.history, names)
     content = found.to_json()
     folder = next((s for s, p in zip(sessions, args.sessions, strict=True)
                    if p.is_dir()), None)  # fmt: skip
@@ -93,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.report.noise_page import render_noise_page
-        from fieldcal.session.folder import write_atomically
+        from fieldcal.session.file_writing import write_atomically
 
         written = write_atomically(args.report, render_noise_page(found))
         (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")
@@ -115,6 +117,25 @@ def _check_distinct(paths: Sequence[Path]) -> None:
     for i, place in enumerate(places):
         if place in places[:i]:
             raise InputError(f"{paths[i]}: is there twice: give each session once")
+
+
+def _check_other_samples(paths: Sequence[Path], sessions: Sequence[Session]) -> None:
+    """Refuse copies of a recording: its noise would count as more.
+
+    Raises
+    ------
+    InputError
+        Naming both.
+
+    """
+    from fieldcal.core.errors import InputError
+    from fieldcal.session.recorded_part import same_recording
+
+    if pair := same_recording([session.folder for session in sessions]):
+        first, second = (paths[i] for i in pair)
+        raise InputError(
+            f"{second}: has the samples of {first}: give each recording once"
+        )
 
 
 def _open_session(path: Path, place: Path) -> Session:

@@ -60,7 +60,7 @@ def select_positions(
 
 def plan_tables(args: argparse.Namespace) -> dict[str, Any]:
     """Tables of device, site and frame: of the file with positions, and of options."""
-    from fieldcal.session.description import FORMAT_VERSION
+    from fieldcal.session.description_file import FORMAT_VERSION
 
     tables = site_tables(args, "device")
     if args.of is not None:
@@ -74,7 +74,7 @@ def plan_tables(args: argparse.Namespace) -> dict[str, Any]:
 
 def _described(path: Path) -> Description:
     """What a session, or a file, says of device, site and positions."""
-    from fieldcal.session.description import read_description
+    from fieldcal.session.description_file import read_description
     from fieldcal.session.folder import DESCRIPTION
 
     return read_description(path / DESCRIPTION if path.is_dir() else path)
@@ -93,7 +93,7 @@ def write_plan(
     """
     import tomlkit
 
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.session.file_writing import write_atomically
     from fieldcal.session.position_tables import position_table
 
     if path.exists():

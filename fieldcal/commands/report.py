@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.write(f"written: {page}\n")
     if args.pdf or args.png:
         from fieldcal.report.browser import Browser
-        from fieldcal.session.folder import write_atomically
+        from fieldcal.session.file_writing import write_atomically
 
         with Browser() as browser:
             browser.open(page)
@@ -88,7 +88,7 @@ def write_report(
     from fieldcal.report import gather, render
     from fieldcal.report.gather import read_earlier_result
     from fieldcal.report.page import REPORT
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.session.file_writing import write_atomically
 
     before = [read_earlier_result(path) for path in earlier] or _earlier_calibrations(
         session, history

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,21 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.find_device import find_device
 from fieldcal.commands.repeated_option import StoreRepeated
-from fieldcal.commands.run_operator import run_operator
 from fieldcal.commands.run_page import LOCAL, serve_page, show_end_on_page
+from fieldcal.commands.run_recording import record_and_solve
 from fieldcal.commands.run_results import (
     report_broken_run,
     tell_calculation,
     write_junit,
 )
 from fieldcal.commands.run_statements import decide_as_stated, write_statements
-from fieldcal.commands.run_task import SESSIONS, make_room, make_task, session_to_resume
+from fieldcal.commands.run_task import SESSIONS, make_task, session_to_resume
 from fieldcal.commands.run_timeouts import (
     HEADLESS_PATIENCE_S,
     OPERATOR_PATIENCE_S,
-    can_ask_operator,
-    give_up_seconds,
-    reconnect_seconds,
 )
 from fieldcal.commands.site import add_site_options
 from fieldcal.core.errors import FieldcalError
@@ -34,8 +30,7 @@ from fieldcal.core.plugins import module_names
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
-    from fieldcal.calibration.limits import GradeLimits
-    from fieldcal.run.companions import Companion
+    from fieldcal.history.location import StoreLocation
     from fieldcal.run.page.server import PageServer
     from fieldcal.run.plan_file import PlanTask
 
@@ -210,6 +205,7 @@ def _run_and_show(
 ) -> int:
     from fieldcal.calibration import limits
     from fieldcal.commands import run_view
+    from fieldcal.commands.progress import SEARCH, show_work
     from fieldcal.commands.run_results import (
         check_companions,
         first_result,
@@ -222,28 +218,20 @@ def _run_and_show(
     bounds = limits.read(task.about.grade, Path(file) if file else None)
     history = History(args.history or default_location())
     try:
-        found, truth, others = _record_and_solve(args, task, folder, bounds, page)
+        found, truth, others = record_and_solve(args, task, folder, bounds, page)
         tell_calculation(args)
-        found = first_result(found, folder, bounds, history)
+        with show_work(args, f"{SEARCH} {folder}"):
+            found = first_result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
         show_end_on_page(page, (), error)
         report_broken_run(args, task, folder, error)
         raise
     if args.junit:
         write_junit(args.junit, task, folder, found.to_json())
-    further = further_results(others, bounds, history)
+    with show_work(args, f"{SEARCH} the recordings of the further devices"):
+        further = further_results(others, bounds, history)
     show_end_on_page(page, (found, *further.values()))
-    if args.json:
-        run_view.show_json(found, truth, further)
-    else:
-        run_view.show_results(found, folder, truth, further)
-    if not args.no_report:
-        for each in (folder, *(folder / name for name in further)):
-            report = run_view.try_write_report(each, history.place)
-            if report and not args.json:
-                sys.stdout.write(f"report:   {report}\n")
-    if not args.json:
-        run_view.show_decisions(found, further, folder)
+    _show_results(args, folder, (found, truth, further), history.place)
     try:
         check_companions(others)
     except FieldcalError as error:
@@ -252,101 +240,24 @@ def _run_and_show(
     return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
 
 
-def _record_and_solve(
+def _show_results(
     args: argparse.Namespace,
-    task: PlanTask,
     folder: Path,
-    bounds: GradeLimits,
-    page: PageServer | None,
-) -> tuple[Calibration, dict[str, Any] | None, Sequence[Companion]]:
-    """Record the positions and solve.
-
-    Returns the calibration, the truth of a virtual device, and the further devices.
-    """
-    from fieldcal.commands.run_device import device_and_mover
-    from fieldcal.run.companions import record_companions, refuse_recorded_companions
-    from fieldcal.run.resuming import recorded_averages
-    from fieldcal.run.retrying_mover import RetryingMover
-    from fieldcal.run.session_run import SessionRun
-    from fieldcal.session.folder import Session
-    from fieldcal.session.recorder import Recorder
-
-    with device_and_mover(task) as (opened, mover), contextlib.ExitStack() as stack:
-        driver = opened()
-        stack.callback(driver.close)
-        known = Session.open(folder) if args.resume else None
-        taken = recorded_averages(known, task) if known else {}
-        if not args.resume:
-            make_room(folder, args.headless)
-            refuse_recorded_companions(folder, len(task.further))
-        own = stack.enter_context(Recorder(folder, None if known else task.tables))
-        args.records = True
-        recorder = stack.enter_context(
-            record_companions(task.further, own, task.tables)
-        )
-        turns = RetryingMover(mover, reconnect_seconds(args))
-        operator = stack.enter_context(run_operator(args, task, turns, folder, page))
-        turns.tell = recorder.tell = operator.tell
-        for sentence in _missing_statements(task):
-            operator.tell(sentence)
-        if known:
-            _mark_remedy_positions(
-                recorder, task, len(known.positions), args.again, taken
-            )
-            recorder.mark("resumed", taken=sorted(taken))
-        how_long = (reconnect_seconds(args), give_up_seconds(args, task))
-        running = SessionRun(
-            task,
-            operator,
-            recorder,
-            opened,
-            bounds,
-            *how_long,
-            taken,
-            can_ask_operator(args),
-        )
-        try:
-            found = running.run(driver)
-        except (FieldcalError, KeyboardInterrupt) as error:
-            recorder.mark("failed", text=str(error) or "interrupted")
-            raise
-        recorder.mark("finished", verdict="good" if found.good else "bad")
-        truth = getattr(mover, "truth", None)
-        return found, dict(truth) if truth else None, recorder.others
-
-
-def _missing_statements(task: PlanTask) -> list[str]:
-    """Sentences about missing level, site and angles, without which it is NO-GO."""
-    from fieldcal import procedures
-    from fieldcal.acceptance.angles import unstated_angles_warning
-    from fieldcal.acceptance.level import level_warning_before_run
-    from fieldcal.acceptance.site import (
-        gravity_missing_warning,
-        latitude_missing_warning,
-    )
-
-    unsaid = [unstated_angles_warning(task.about)]
-    if procedures.max_positions(task.about, task.procedure) is None:
-        unsaid.append(level_warning_before_run(task.about))
-    unsaid.append(latitude_missing_warning(task.about))
-    unsaid.append(gravity_missing_warning(task.about))  # the most important one last
-    return [sentence for sentence in unsaid if sentence]
-
-
-def _mark_remedy_positions(
-    recorder: Any,
-    task: PlanTask,
-    known: int,
-    again: Sequence[int],
-    taken: dict[int, Any],
+    results: tuple[Calibration, dict[str, Any] | None, dict[str, Calibration]],
+    history: StoreLocation,
 ) -> None:
-    """Mark the positions that a remedy adds and those that it repeats."""
-    from fieldcal.session.marks import POSITION_ADDED
-    from fieldcal.session.position_tables import position_table
+    """Print and report the result, the truth if known, and the further devices'."""
+    from fieldcal.commands import run_view
 
-    for number in again:
-        recorder.mark("repeated", position=number)
-        taken.pop(number, None)
-    for number, position in enumerate(task.about.positions[known:], known):
-        where = {**position_table(position), "seconds": task.seconds}
-        recorder.mark(POSITION_ADDED, position=number, **where)
+    found, truth, further = results
+    if args.json:
+        run_view.show_json(found, truth, further)
+    else:
+        run_view.show_results(found, folder, truth, further)
+    if not args.no_report:
+        for each in (folder, *(folder / name for name in further)):
+            report = run_view.try_write_report(each, history)
+            if report and not args.json:
+                sys.stdout.write(f"report:   {report}\n")
+    if not args.json:
+        run_view.show_decisions(found, further, folder)

@@ -52,8 +52,8 @@ def solve_and_decide(
     """
     from fieldcal.acceptance.assessment import assess, store_in_history
     from fieldcal.commands.install_values import add_install_values
-    from fieldcal.evaluation.observations import usable_windows
     from fieldcal.evaluation.solution import solve_session
+    from fieldcal.evaluation.usable_windows import usable_windows
     from fieldcal.session.folder import RESULT
 
     still = usable_windows(session)
@@ -120,7 +120,7 @@ def write_junit(
     """Write the outcome as JUnit XML; `result` is None if the run broke off."""
     from fieldcal.acceptance.verification import planned_verification
     from fieldcal.run import junit
-    from fieldcal.session.description import with_added_positions
+    from fieldcal.session.description_file import with_added_positions
     from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
     from fieldcal.session.position_tables import parse_positions
 

@@ -84,8 +84,9 @@ def _write(session: Session, given: Mapping[str, Mapping[str, Any]]) -> None:
     import tomlkit
 
     from fieldcal.run.companions import companion_folders
-    from fieldcal.session.description import parse_description
-    from fieldcal.session.folder import DESCRIPTION, write_atomically
+    from fieldcal.session.description_file import parse_description
+    from fieldcal.session.file_writing import write_atomically
+    from fieldcal.session.folder import DESCRIPTION
     from fieldcal.session.lock import SessionLock
 
     parse_description(merge_tables(session.about.raw, given))  # refuses what cannot be
@@ -112,6 +113,7 @@ def decide_as_stated(args: argparse.Namespace, folder: Path) -> int | None:
     """
     from fieldcal.calibration import limits
     from fieldcal.commands import run_view
+    from fieldcal.commands.progress import SEARCH, show_work
     from fieldcal.commands.run_results import solve_and_decide
     from fieldcal.core.documents import load_json
     from fieldcal.history.location import default_location
@@ -127,7 +129,8 @@ def decide_as_stated(args: argparse.Namespace, folder: Path) -> int | None:
     history = History(args.history or default_location())
     before = load_json((folder / RESULT).read_text("utf-8"))
     method = str(before.get("method", "auto"))
-    found = solve_and_decide(session, bounds, history, method)
+    with show_work(args, f"{SEARCH} {folder}"):
+        found = solve_and_decide(session, bounds, history, method)
     go = run_view.is_go(found)
     if not go and (found.info["decision"].get("remedy") or positions_left_out(session)):
         return None

@@ -111,9 +111,9 @@ def session_to_resume(folder: Path) -> Path:
 
 def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:
     from fieldcal.run import plan_file
-    from fieldcal.session import description
+    from fieldcal.session import description_file
 
-    tables = {"format": description.FORMAT_VERSION, **site_tables(args, "device")}
+    tables = {"format": description_file.FORMAT_VERSION, **site_tables(args, "device")}
     tables["position"] = plan_file.default_positions(args.procedure)
     tables["run"] = {"procedure": args.procedure, **_run_options(args)}
     return tables

@@ -61,12 +61,14 @@ def _sessions_with_rows(args: argparse.Namespace) -> list[StoredSession]:
         If a session cannot be solved.
 
     """
-    from fieldcal.commands.batch import process_with_progress, worker_pool
+    from fieldcal.commands.batch import worker_pool
+    from fieldcal.commands.progress import process_with_progress
     from fieldcal.fleet.batch import SessionBatch
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
+    from fieldcal.history.repeats import copy_sentence
     from fieldcal.history.sessions import without_repeats
 
     folders = sessions_in(args.sessions)
@@ -84,11 +86,14 @@ def _sessions_with_rows(args: argparse.Namespace) -> list[StoredSession]:
         if one.error:
             raise InputError(f"{one.error}; or leave {Path(one.folder).name} out")
     rows, repeats = without_repeats(rows)
-    for one in repeats:
-        sys.stderr.write(
-            f"fieldcal diagnose: {escape_line(one.folder)}: has the samples of another"
-            " session, and is left out\n"
+    for one, other in repeats:
+        said = (
+            f"{escape_line(one.folder)}: has the samples of"
+            f" {escape_line(other.folder)}, and is left out"
         )
+        if one.part and other.part and one.part.digest != other.part.digest:
+            said = copy_sentence(one.folder, other.folder)
+        sys.stderr.write(f"fieldcal diagnose: {said}\n")
     return rows
 
 

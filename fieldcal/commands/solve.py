@@ -17,7 +17,7 @@ from fieldcal.core.factory import FACTORY_KEYS
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.calibration.lot_prior import LotPrior
-    from fieldcal.evaluation.observations import UsableWindows
+    from fieldcal.evaluation.usable_windows import UsableWindows
     from fieldcal.session.folder import Session
 
 RARE = ("as_printed", "method", "heading", "history", "lot")
@@ -88,26 +88,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.decision_view import show_decision
-    from fieldcal.commands.install_values import add_install_values
     from fieldcal.commands.lot_prior_view import show_lot_prior
     from fieldcal.commands.over_time_view import show_over_time
+    from fieldcal.commands.progress import SEARCH, show_work
     from fieldcal.commands.table import show_calibration
-    from fieldcal.evaluation.observations import usable_windows
-    from fieldcal.evaluation.omitted_effects import with_repaired_bytes
     from fieldcal.session.folder import RESULT, Session
 
     session = Session.open(args.session)
-    if not args.as_printed:
-        session, repaired = with_repaired_bytes(session)
-    still = usable_windows(session)
-    found = _solve_session(args, session, still)
-    if not args.as_printed:
-        found = replace(found, warnings=(*repaired, *found.warnings))
-    found = add_install_values(found, session)
-    over_time = _solve_over_time(session) if args.over_time else None
-    if over_time is not None:
-        found = replace(found, info={**found.info, "over_time": over_time})
-    found = _decide(args, found, session, still)
+    with show_work(args, f"{SEARCH} {args.session}"):
+        found = _solve_and_decide(args, session)
     if args.json:
         for warning in found.warnings:
             sys.stderr.write(f"fieldcal solve: {warning}\n")
@@ -122,6 +111,25 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(f"written: {path}\n")
     go = found.info.get("decision", {}).get("go", True)
     return 0 if found.good and go else 1
+
+
+def _solve_and_decide(args: argparse.Namespace, session: Session) -> Calibration:
+    """Calibration of a session with what the options ask for, and its decision."""
+    from fieldcal.commands.install_values import add_install_values
+    from fieldcal.evaluation.omitted_effects import with_repaired_bytes
+    from fieldcal.evaluation.usable_windows import usable_windows
+
+    repaired: tuple[str, ...] = ()
+    if not args.as_printed:
+        session, repaired = with_repaired_bytes(session)
+    still = usable_windows(session)
+    found = _solve_session(args, session, still)
+    found = replace(found, warnings=(*repaired, *found.warnings))
+    found = add_install_values(found, session)
+    over_time = _solve_over_time(session) if args.over_time else None
+    if over_time is not None:
+        found = replace(found, info={**found.info, "over_time": over_time})
+    return _decide(args, found, session, still)
 
 
 def _solve_session(
@@ -177,6 +185,7 @@ def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
     from fieldcal.history import filters, sessions
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
+    from fieldcal.history.repeats import copy_sentence, shorter_copies
     from fieldcal.session.recorded_part import recorded_part
 
     wanted = filters.parse_filters(args.lot)
@@ -186,6 +195,8 @@ def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
     )
     if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
         sys.stderr.write(f"fieldcal solve: {lost}\n")
+    for pair in database.run(lambda db: shorter_copies(db, wanted)):
+        sys.stderr.write(f"fieldcal solve: {copy_sentence(*pair)}\n")
     serial = str(session.about.device.get("serial", ""))
     folder = str(session.folder.resolve())
     part = recorded_part(session.folder)

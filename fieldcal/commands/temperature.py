@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.export import number_of_sensor
+from fieldcal.commands.temperature_view import show_model
 from fieldcal.core.errors import InputError
 from fieldcal.core.escaping import escape_line
 
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
     else:
-        _print_model(found, args.at, points[-1])
+        show_model(found, args.at, points[-1])
     for sentence in (*groups_left_out(points), *find_disagreements(found)):
         sys.stderr.write(f"fieldcal temperature: {sentence}\n")
     if args.output:
@@ -112,7 +113,21 @@ def read_points(paths: Sequence[Path]) -> list[ThermalPoint]:
         listed = ", ".join(f"{name} of {serial}" for serial, name in serials.items())
         raise InputError(f"{listed}: give sessions of one device")
     _check_distinct(points)
+    _check_other_samples(paths)
     return points
+
+
+def _check_other_samples(paths: Sequence[Path]) -> None:
+    """Refuse copies of a recording, of which one may have been continued since."""
+    from fieldcal.session.folder import RESULT
+    from fieldcal.session.recorded_part import same_recording
+
+    folders = [path.parent if path.name == RESULT else path for path in paths]
+    if pair := same_recording(folders):
+        first, second = (paths[i] for i in pair)
+        raise InputError(
+            f"{second}: has samples of {first}: give each recording once, the longer"
+        )
 
 
 def _check_distinct(points: Sequence[ThermalPoint]) -> None:
@@ -192,48 +207,6 @@ def _at_temperature(
     }
 
 
-def _print_model(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
-    from fieldcal.calibration.wording import (
-        format_unit,
-        format_with_sigma,
-        parameter_title,
-    )
-    from fieldcal.commands.text_columns import text_columns
-    from fieldcal.thermal.wording import REPORTED_SIGMAS, change_sentences
-
-    say = sys.stdout.write
-    say(
-        f"{len(found.sessions)} sessions at {found.low:.1f} to {found.high:.1f} °C;"
-        " between them, ± 1σ:\n"
-    )
-    shown = [found.low, found.reference, found.high]
-    if at is not None:
-        shown = sorted({*shown, at})
-    heads = [f"{t:.1f} °C" for t in shown]
-    rows = [["parameter", *heads, "from run to run", "order"]]
-    values = {t: found.at(t) for t in shown}
-    for name, curve in found.curves.items():
-        cells = [" ± ".join(format_with_sigma(*values[t][name])) for t in shown]
-        order = f"{curve.order} (P = {curve.orders[curve.order]:.2f})"
-        unit = format_unit(curve.unit)
-        spread = f"± {curve.spread:.2g} {unit}".rstrip()
-        rows.append([parameter_title(name), *cells, spread, order])
-    for line in text_columns(rows):
-        say(line + "\n")
-    if at is not None:
-        told, rest = change_sentences(found.change(at, last.temperature))
-        say(
-            f"\nat {at:.1f} °C with the calibration of {escape_line(last.name)}"
-            f" ({last.temperature:.1f} °C), off by:\n"
-        )
-        say("".join(f"  {line}\n" for line in told))
-        if rest:
-            say(
-                f"  less than {REPORTED_SIGMAS:.0f} of its ±:"
-                f" {', '.join(map(parameter_title, rest))}\n"
-            )
-
-
 def _autopilot_parameters(
     autopilot: int,
     found: ThermalModel,
@@ -259,8 +232,8 @@ def _write_model(
         If the file exists already.
 
     """
-    from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, PX4
+    from fieldcal.session.file_writing import write_atomically
 
     path: Path = args.output
     if path.exists():
@@ -301,14 +274,14 @@ def _install_model(
         If a session is NO-GO, or disagrees with the others.
 
     """
-    from fieldcal.commands.write import (
+    from fieldcal.commands.autopilot import (
         InstallRefused,
-        change_table,
         check_ready,
         open_parameters,
         write_parameters,
     )
-    from fieldcal.drivers.mavlink_installed import PX4
+    from fieldcal.commands.write import change_table
+    from fieldcal.drivers.mavlink_parameter_names import PX4
     from fieldcal.install.proposal import Change
     from fieldcal.install.thermal import id_names
 

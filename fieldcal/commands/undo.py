@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.commands.write import check_ready, confirm, open_parameters
+    from fieldcal.commands.autopilot import check_ready, confirm, open_parameters
     from fieldcal.install.transaction import (
         WriteRolledBack,
         broken_off,

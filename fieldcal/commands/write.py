@@ -5,18 +5,23 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.core.errors import FieldcalError, InputError
+from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.drivers.mavlink_installed import InstalledCalibration
-    from fieldcal.drivers.mavlink_parameters import ParameterLink
     from fieldcal.install.proposal import Change
     from fieldcal.session.folder import Session
+from fieldcal.commands.autopilot import (
+    InstallRefused,
+    check_ready,
+    open_parameters,
+    write_parameters,
+)
 
 EXAMPLE = """\
   fieldcal write bench-7/2026-03-01 --device mavlink:/dev/ttyACM0
@@ -26,12 +31,6 @@ EXAMPLE = """\
 
 SIGNIFICANT_SIGMAS = 3.0
 """Standard uncertainties beyond which a parameter counts as changed."""
-
-
-class InstallRefused(FieldcalError):
-    """The calibration must not be installed."""
-
-    exit_code = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,7 +89,10 @@ def propose_changes(
 
     """
     from fieldcal.calibration import Nominal
-    from fieldcal.drivers.mavlink_installed import GYRO_CAL_AT_START, replaced_at_start
+    from fieldcal.drivers.mavlink_parameter_names import (
+        GYRO_CAL_AT_START,
+        replaced_at_start,
+    )
     from fieldcal.install.proposal import (
         changes,
         installed_in,
@@ -170,7 +172,7 @@ def _write_file(path: Path, wanted: Sequence[Change]) -> None:
         If the ending is unknown.
 
     """
-    from fieldcal.session.folder import write_atomically
+    from fieldcal.session.file_writing import write_atomically
 
     if path.suffix in (".param", ".parm"):
         lines = [f"{c.name},{c.new:.9g}" for c in wanted]
@@ -194,126 +196,3 @@ def _write_device(
     with open_parameters(args.device) as link:
         check_ready(link, installed.autopilot)
         write_parameters(link, args.device, session.folder, known, new, args.yes)
-
-
-def write_parameters(
-    link: ParameterLink,
-    device: str,
-    folder: Path,
-    known: Mapping[str, float],
-    new: Mapping[str, float],
-    yes: bool,
-) -> None:
-    """Write parameters, after saving the old ones in a session's folder.
-
-    Parameters
-    ----------
-    link, device : the autopilot, and its address
-    folder : of the session
-    known : values that the autopilot is expected to have
-    new : values to write
-    yes : whether to write without asking
-
-    """
-    from fieldcal.drivers.mavlink_parameters import same_float32
-    from fieldcal.install.transaction import (
-        WriteRolledBack,
-        broken_off,
-        check_unchanged,
-        install,
-        note_done,
-        save,
-        unfinished,
-    )
-
-    earlier = unfinished(folder)
-    if earlier:  # its values come from an interrupted write
-        now = link.read(known)
-        old = {name: earlier[1]["old"].get(name, now[name]) for name in now}
-        if said := broken_off(now, old, earlier[1]["new"]):
-            sys.stderr.write(f"{said}\n")
-    else:
-        now = old = check_unchanged(link, known, "while it was recorded", new)
-    if all(same_float32(now[name], value) for name, value in new.items()):
-        if earlier:
-            note_done(earlier[0], done=True)
-        sys.stderr.write(f"all {len(new)} parameters are installed already\n")
-        return
-    confirm(f"write these {len(new)} parameters to {device}", yes)
-    path = save(folder, device, old, new)
-    if earlier:
-        note_done(earlier[0], undone=True)
-    try:
-        install(link, old, new)
-    except WriteRolledBack:
-        note_done(path, undone=True)
-        raise
-    note_done(path, done=True)
-    undo = f"fieldcal undo {folder} --device {device}"
-    sys.stderr.write(
-        f"written and read back: {len(new)} parameters; the old ones are in {path}\n"
-        f"to take it back: {undo}\n"
-    )
-
-
-def open_parameters(url: str) -> Any:
-    """Open the parameters of an autopilot.
-
-    Raises
-    ------
-    InputError
-        If the address is not of MAVLink, or pymavlink is not installed.
-
-    """
-    from importlib.util import find_spec
-
-    scheme, _, address = url.partition(":")
-    if scheme != "mavlink":
-        raise InputError(
-            f"{url}: parameters are written over mavlink:, such as"
-            " mavlink:udp:0.0.0.0:14550; for other devices fieldcal export"
-        )
-    if not find_spec("pymavlink"):
-        raise InputError("MAVLink needs pymavlink: pip install 'fieldcal[mavlink]'")
-    from fieldcal.drivers.mavlink_parameters import ParameterLink
-
-    return ParameterLink(address)
-
-
-def check_ready(link: Any, autopilot: int) -> None:
-    """Refuse an autopilot that is armed or runs another program.
-
-    Raises
-    ------
-    InputError
-        If the autopilot is refused.
-
-    """
-    if link.armed:
-        raise InputError(f"{link.name}: the vehicle is armed: disarm it, then write")
-    if link.autopilot != autopilot:
-        raise InputError(
-            f"{link.name}: this autopilot runs another program than the one that was"
-            " recorded: name the right one"
-        )
-
-
-def confirm(what: str, yes: bool) -> None:
-    """Ask the user for confirmation, unless `yes`.
-
-    Raises
-    ------
-    InputError
-        If there is no terminal to ask at.
-    InstallRefused
-        If the answer is no.
-
-    """
-    if yes:
-        return
-    if not sys.stdin.isatty():
-        raise InputError(f"nobody is there to be asked: give --yes to {what}")
-    sys.stderr.write(f"{what}? [y/N] ")
-    sys.stderr.flush()
-    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise InstallRefused("nothing was written, as you wished")

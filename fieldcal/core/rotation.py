@@ -70,3 +70,13 @@ def cross_matrix(v: Array) -> Array:
     x = np.zeros((*v.shape, 3))
     x[..., 2, 1], x[..., 0, 2], x[..., 1, 0] = v[..., 0], v[..., 1], v[..., 2]
     return np.asarray(x - np.swapaxes(x, -1, -2))
+
+
+def nearest_rotation(matrix: Array) -> Array:
+    """Rotation R that is nearest to a matrix B, (3, 3): it maximises tr(R^T B).
+
+    Of vectors x and y = R x with noise, B = sum y x^T (Wahba's problem).
+    """
+    left, _, right = np.linalg.svd(matrix)
+    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    return np.asarray(left @ sign @ right)

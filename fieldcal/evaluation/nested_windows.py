@@ -32,11 +32,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.observations import (
-    angle_setting,
-    build_observations,
-    usable_windows,
-)
+from fieldcal.evaluation.observations import angle_setting, build_observations
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.model import priors
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session

@@ -15,16 +15,13 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.diagnosis.explain import Explanation, explain, times_since_turn
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
-from fieldcal.evaluation.observations import (
-    UsableWindows,
-    build_observations,
-    reported_grain,
-)
+from fieldcal.evaluation.observations import build_observations
 from fieldcal.evaluation.rounding_mode import (
     RoundingMode,
     rounding_mode,
 )
 from fieldcal.evaluation.undisturbed_span import undisturbed_span
+from fieldcal.evaluation.usable_windows import UsableWindows, reported_grain
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations

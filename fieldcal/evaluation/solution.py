@@ -18,20 +18,15 @@ from fieldcal.core.errors import NotObservable
 from fieldcal.evaluation.angle_setting import with_shown_angle_setting
 from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.level_check import with_tilt_shown
-from fieldcal.evaluation.observations import (
-    UsableWindows,
-    angle_setting,
-    with_provenance,
-)
+from fieldcal.evaluation.observations import angle_setting, with_provenance
 from fieldcal.evaluation.omitted_effects import (
     omitted_effects,
     with_description_faults,
     with_omitted_effects,
 )
 from fieldcal.evaluation.prepared_session import PreparedSession
-from fieldcal.evaluation.rounding_mode import (
-    with_rounding_uncertainty,
-)
+from fieldcal.evaluation.rounding_mode import with_rounding_uncertainty
+from fieldcal.evaluation.usable_windows import UsableWindows
 from fieldcal.model import priors
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors

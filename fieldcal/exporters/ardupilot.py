@@ -26,17 +26,16 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import DiagonalCalibration, reduce_to_diagonal
 from fieldcal.calibration.names import sensor_of
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import (
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, identity_parameters
+from fieldcal.drivers.mavlink_parameter_names import (
     ARDUPILOT,
     GYRO_CAL_AT_START,
-    InstalledCalibration,
     check_number,
-    identity_parameters,
     parameter_names,
     replaced_at_start,
 )
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
 ENDING = ".param"

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 WHAT = "table of the parameters with their sigma and unit"
 ENDING = "_calibration.csv"

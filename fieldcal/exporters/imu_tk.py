@@ -22,7 +22,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 WHAT = "matrices of imu_tk (T, K, bias)"
 ENDING = "_acc.calib"

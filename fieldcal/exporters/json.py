@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 WHAT = "one JSON object, with a JSON Schema"
 ENDING = "_calibration.json"

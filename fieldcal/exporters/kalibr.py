@@ -29,7 +29,8 @@ import numpy as np
 
 from fieldcal.core.samples import ACC, GYR, Array, Block
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import Session, write_atomically
+from fieldcal.session.file_writing import write_atomically
+from fieldcal.session.folder import Session
 from fieldcal.session.noise_file import read_noise
 
 WHAT = "Kalibr's imu.yaml (noise, M, C, bias)"

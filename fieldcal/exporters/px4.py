@@ -20,10 +20,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from fieldcal.calibration import Calibration, Nominal
-from fieldcal.drivers.mavlink_installed import PX4, InstalledCalibration
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import PX4
 from fieldcal.exporters import ExportSource
 from fieldcal.exporters.ardupilot import ArdupilotParameters, autopilot_parameters
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 WHAT = "PX4 parameters (CAL_ACC, CAL_GYRO), for QGroundControl"
 ENDING = ".params"

@@ -22,7 +22,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 from fieldcal.session.noise_file import read_noise
 
 WHAT = "yaml of ROS imu_calib (SM, bias)"

@@ -16,7 +16,7 @@ from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.filters import LEVELS
-from fieldcal.history.repeats import replacing_folders
+from fieldcal.history.repeats import replacing_folders, shorter_copies
 from fieldcal.history.sessions import StoredSession
 
 CHUNK = 500
@@ -105,6 +105,12 @@ class SessionBatch:
                     db, folders=some, documents=True, reduced=True
                 )  # type: ignore[misc]
             )
+
+    def shorter_copies(self) -> list[tuple[str, str]]:
+        """Folders that a longer copy of their run replaces, each with the latter."""
+        asked = {storable_text(str(folder)) for folder in self.folders}
+        found = self.database.run(shorter_copies)
+        return [pair for pair in found if pair[0] in asked]
 
     def write(self, path: Path) -> None:
         """Write the results as Parquet, one row per session, complete or not at all.

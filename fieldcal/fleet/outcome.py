@@ -20,14 +20,14 @@ from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.omitted_effects import with_repaired_bytes
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_prepared
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration
-from fieldcal.session.description import with_bare_names
+from fieldcal.session.description_file import with_bare_names
 from fieldcal.session.folder import DESCRIPTION, Session
 from fieldcal.session.recorded_part import recorded_part
 

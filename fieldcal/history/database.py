@@ -20,11 +20,11 @@ from sqlalchemy.pool import NullPool
 from fieldcal.core.errors import InputError
 from fieldcal.history.location import StoreLocation, is_address
 
-LAST_MIGRATION = "recordings"
+LAST_MIGRATION = "runs"
 """The last migration."""
 
-OLDER_VERSIONS, NEWEST_VERSION = (1, 2), 3
-"""user_version of a SQLite file before the first migration, after it, and now."""
+OLDER_VERSIONS, NEWEST_VERSION = (1, 2, 3), 4
+"""user_version of a SQLite file that is migrated, and now."""
 
 LOCK_TIMEOUT = 60.0
 """Longest wait for a file that another program has locked, s."""

@@ -111,8 +111,8 @@ def store_session(db: Connection, one: StoredSession) -> None:
     """Store a session; an earlier one of the same folder is replaced.
 
     A folder is one session, also if its serial number was corrected. An error replaces
-    no result: it is stored in addition. Of several folders with the same samples, the
-    last one stored counts (`repeats`).
+    no result: it is stored in addition. Of several folders with the same samples, one
+    counts (`repeats`).
     """
     error = None if one.error is None else storable_text(one.error)
     one = replace(one, folder=storable_text(one.folder), error=error)
@@ -166,6 +166,8 @@ def _row(one: StoredSession) -> dict[str, Any]:
         "recording": None if one.part is None else one.part.digest,
         "part_start": None if one.part is None else one.part.start,
         "part_end": None if one.part is None else one.part.end,
+        "samples": None if one.part is None else one.part.samples,
+        "run_id": None if one.part is None else one.part.run,
         "error": one.error,
         "result": json.dumps(one.result) if one.result is not None else None,
         "diagnosis": json.dumps(one.diagnosis) if one.diagnosis is not None else None,
@@ -273,15 +275,23 @@ def _session_of_row(
 
 def without_repeats(
     some: Iterable[StoredSession],
-) -> tuple[list[StoredSession], list[StoredSession]]:
-    """Sessions of which no two use the same samples, and those that are left out."""
-    kept, left_out = list[StoredSession](), list[StoredSession]()
-    for one in some:
-        again = one.part is not None and any(
-            other.part is not None and other.part.overlaps(one.part) for other in kept
-        )
-        (left_out if again else kept).append(one)
-    return kept, left_out
+) -> tuple[list[StoredSession], list[tuple[StoredSession, StoredSession]]]:
+    """Sessions of which no two use the same samples, and those that are left out.
+
+    Each of the latter stands with the one that is used instead: the one of more
+    samples, else the first.
+    """
+    some = list(some)
+    kept: list[StoredSession] = []
+    left_out: list[tuple[StoredSession, StoredSession]] = []
+    for one in sorted(some, key=lambda one: -(one.part.samples if one.part else 0)):
+        for other in kept:
+            if one.part and other.part and other.part.overlaps(one.part):
+                left_out.append((one, other))
+                break
+        else:
+            kept.append(one)
+    return [one for one in some if any(one is other for other in kept)], left_out
 
 
 def parameter_values(

@@ -44,6 +44,8 @@ SESSION = Table(
     Column("recording", String),
     Column("part_start", Float),
     Column("part_end", Float),
+    Column("samples", Integer),
+    Column("run_id", String),
     Column("superseded", Boolean, nullable=False),
     Column("error", Text),
     Column("result", Text),
@@ -51,13 +53,15 @@ SESSION = Table(
     UniqueConstraint("serial", "folder", name="session_once"),
     Index("session_of_folder", "folder", unique=True),
     Index("session_recording", "recording"),
+    Index("session_run", "run_id"),
 )
 """One row for each session folder.
 
 `serial` is empty if unknown. `go` is null without a decision. `fingerprint` shows
 whether the files in the folder have changed. `recording`, `part_start` and `part_end`
-are the samples that the session uses; null if unknown. `superseded` is true if another
-row has a result of the same samples that counts instead. `error` states why there is no
+are the samples that the session uses, of the `samples` of its recording, made by the
+run `run_id`; null if unknown. `superseded` is true if another row has a result of the
+same samples that counts instead. `error` states why there is no
 newer result. `result` and `diagnosis` are the JSON documents.
 """
 

@@ -18,7 +18,8 @@ from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.drivers import codec
 from fieldcal.importing.files.gzip_stream import first_bytes
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import Recording
 
 TRIED_LAST = ("csv_like", "wire")
 """Formats without a mark of their own, tried last, in this order."""

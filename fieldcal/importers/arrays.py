@@ -37,7 +37,8 @@ from fieldcal.importing.arrays.matlab_objects import holds_objects, object_table
 from fieldcal.importing.arrays.paired_tables import ArrayPairing, pair_arrays
 from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
 from fieldcal.importing.headings.heading import Heading
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.times.said_rate import named_scalars, stated_rate
 
@@ -147,14 +148,8 @@ class ArrayFile(ColumnRecording):
                 f"t=time,ax=acc.0,ay=acc.1; there are {describe_tables(tables)}"
             )
 
-    def blocks(self, stream: str) -> Iterator[Block]:
+    def read_samples(self) -> Iterator[Block]:
         """Samples, some rows at a time."""
-        if len(self.imus()) > 1:
-            yield from self.alone(stream).blocks(stream)
-            return
-        yield from self.paired(self._samples())
-
-    def _samples(self) -> Iterator[Block]:
         with self._opened() as tables:
             named = self._named(tables)
             samples = columns.ColumnReader(replace(self.wanted, columns=tuple(named)))

@@ -23,7 +23,8 @@ from fieldcal.importing import columns
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.files.text_encoding import is_mostly_text, utf16_encoding
 from fieldcal.importing.headings.heading import Heading
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.tables.text_heading import TextHeading
 from fieldcal.importing.text.instances import ImuInstances, find_instances
@@ -215,14 +216,8 @@ class TextColumns(ColumnRecording):
         """Rate that a line above its numbers says."""
         return find_stated_rate(self._lines, self.wanted.separator)
 
-    def blocks(self, stream: str) -> Iterator[Block]:
+    def read_samples(self) -> Iterator[Block]:
         """Samples, a piece of the file at a time."""
-        if len(self.imus()) > 1:
-            yield from self.alone(stream).blocks(stream)
-            return
-        yield from self.paired(self._samples())
-
-    def _samples(self) -> Iterator[Block]:
         columns.check_columns(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != SKIP]

@@ -17,11 +17,8 @@ from numpy.typing import NDArray
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.mavlink_installed import (
-    ARDUPILOT,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, parameter_names
 from fieldcal.drivers.mavlink_units import untruncated_mean
 from fieldcal.importing.messages.dataflash_messages import (
     BODY,

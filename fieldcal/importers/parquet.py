@@ -69,14 +69,8 @@ class ParquetFile(ColumnRecording):
             f" are {', '.join(names[:30])}"
         )
 
-    def blocks(self, stream: str) -> Iterator[Block]:
+    def read_samples(self) -> Iterator[Block]:
         """Samples, a batch at a time."""
-        if len(self.imus()) > 1:
-            yield from self.alone(stream).blocks(stream)
-            return
-        yield from self.paired(self._samples())
-
-    def _samples(self) -> Iterator[Block]:
         samples, clock = columns.ColumnReader(self.wanted), ClockText()
         with self._batches() as (schema, batches):
             named = self._named(schema)

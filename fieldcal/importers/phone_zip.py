@@ -24,7 +24,8 @@ from fieldcal.core.samples import Block
 from fieldcal.importers.csv_like import TextColumns
 from fieldcal.importers.workbook import MARKS
 from fieldcal.importing import columns
-from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.alignment import AlignedPair
 from fieldcal.importing.times.gravity_sum import GravitySum, lacks_gravity
 from fieldcal.importing.times.row_validator import RowValidator

@@ -18,8 +18,9 @@ import numpy as np
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.mavlink_frames import HEADER_BYTES, VERSION_2
-from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
 from fieldcal.drivers.mavlink_log import STAMP_BYTES, split_log, split_whole_packets
+from fieldcal.drivers.mavlink_parameter_names import parameter_names
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.importing.recording import ImuStream, Recording

@@ -25,11 +25,8 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.drivers.mavlink_installed import (
-    PX4,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import PX4, parameter_names
 from fieldcal.importing.messages.ulog_fifo import FifoReader
 from fieldcal.importing.messages.ulog_messages import Table, Topic, UlogMessages
 from fieldcal.importing.recording import ImuStream, Recording

@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.core.sentences import join_words
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.times.repeats import NO_VALUES, RepeatFinder
 from fieldcal.importing.times.row_times import CLOCK_PARTS, RowTimes
 from fieldcal.importing.units.missing_numbers import MissingNumbers

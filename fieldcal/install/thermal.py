@@ -28,7 +28,7 @@ from numpy.polynomial import Polynomial
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
-from fieldcal.drivers.mavlink_installed import (
+from fieldcal.drivers.mavlink_parameter_names import (
     ARDUPILOT,
     PX4,
     ardupilot_prefix,

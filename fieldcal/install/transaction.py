@@ -16,17 +16,17 @@ from typing import Any
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.mavlink_dialog import parameter_list
-from fieldcal.drivers.mavlink_installed import (
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, identity_parameters
+from fieldcal.drivers.mavlink_parameter_names import (
     ARDUPILOT,
     MOST_SENSORS,
     PX4,
-    InstalledCalibration,
     ardupilot_prefix,
-    identity_parameters,
     parameter_names,
 )
 from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32
-from fieldcal.session.folder import DESCRIPTION, Session, write_atomically
+from fieldcal.session.file_writing import write_atomically
+from fieldcal.session.folder import DESCRIPTION, Session
 
 SAVED = "installed-before-"
 """What the name of a file with an old set begins with."""

@@ -19,9 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.noise.device_filter import without_filter
 from fieldcal.noise.likelihood import Flags, Powers, whittle_likelihood
 from fieldcal.noise.spectrum import CosineSpectrum
-from fieldcal.noise.terms import fit_untimed_terms, without_filter
+from fieldcal.noise.untimed_terms import fit_untimed_terms
 
 ROUNDS = 3
 """Fits of beta and S in turn."""

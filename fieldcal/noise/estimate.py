@@ -19,6 +19,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, UNITS, Array
 from fieldcal.noise.averaging import AveragingError, averaging_error
 from fieldcal.noise.covariates import fit_covariates, thermometer_covariate
+from fieldcal.noise.device_filter import FILTERED_HZ
 from fieldcal.noise.filters import FilterNoisePair, fit_filter_noise
 from fieldcal.noise.levels import ReducedStretch
 from fieldcal.noise.likelihood import NoiseFit
@@ -33,7 +34,7 @@ from fieldcal.noise.processes import PROCESS_UNITS
 from fieldcal.noise.reduction import CHANNELS as NOISY
 from fieldcal.noise.reduction import Reduction
 from fieldcal.noise.spectrum import CosineSpectrum
-from fieldcal.noise.terms import FILTERED_HZ, ChosenProcesses, choose_processes
+from fieldcal.noise.terms import ChosenProcesses, choose_processes
 from fieldcal.noise.upper_limit import upper_limit
 
 MIN_STRETCH_S = 30.0

@@ -1,10 +1,8 @@
 """Which processes a channel has: those that predict held-out coefficients.
 
 A process is added or removed by the score of held-out coefficients (`likelihood`): it
-is accepted if the gain exceeds its standard error. Above 1 Hz, where a device filters
-its outputs and machines hum, bins can have a level of their own instead: the noise of
-windows of seconds is below. If the processes do not explain the scatter of the powers,
-all uncertainties are enlarged by that dispersion.
+is accepted if the gain exceeds its standard error. If the processes do not explain the
+scatter of the powers, all uncertainties are enlarged by that dispersion.
 
 Source of the rule: Breiman et al. 1984, one standard error.
 """
@@ -15,35 +13,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.probability import MAD_TO_SIGMA
-from fieldcal.core.samples import Array
+from fieldcal.noise.device_filter import without_filter
+from fieldcal.noise.fit_quality import (
+    dispersion_of_bins,
+    predicts_better,
+)
 from fieldcal.noise.likelihood import (
     TIMED_TERMS,
-    Flags,
     NoiseFit,
     Powers,
-    expected_powers,
     fit_processes,
 )
 from fieldcal.noise.reference import most_probable_sizes
 from fieldcal.noise.spectrum import CosineSpectrum
+from fieldcal.noise.untimed_terms import fit_white_noise
 
-FILTERED_HZ = 1.0
-"""Lowest corner frequency of a device's filter, Hz."""
-
-BENT = 2.5
-"""Standard errors by which an octave is off that a filter bends."""
-
-MIN_LEFT = 500
-"""Fewest coefficients that are left: they tell white noise to 3 %."""
-
-FOLDED = 0.02
-"""Largest part of its white noise that a bin may have from beyond a corner."""
-
-UNTIMED_TERMS = ("N", "Q", "B", "K")
 MOST_MARKOV = 2
 NEGLIGIBLE = 0.01
-MULTIPLIED = 100
 STARTS = 6
 """Correlation times with which the fit of a Gauss-Markov process begins."""
 
@@ -73,7 +59,7 @@ def choose_processes(spectrum: CosineSpectrum, powers: Powers) -> ChosenProcesse
     """Choose the processes of a channel."""
     powers = without_filter(spectrum, powers)
     best, seen = grow_set(spectrum, powers)
-    dispersion = _dispersion(powers, best)
+    dispersion = dispersion_of_bins(powers, best)
     if dispersion > 1:
         powers = powers.scaled(dispersion)
         best, seen = grow_set(spectrum, powers)
@@ -106,7 +92,7 @@ def grow_set(
 
     Returns the best fit, and all fits that were tried.
     """
-    best = _white_only(spectrum, powers)
+    best = fit_white_noise(spectrum, powers)
     seen = [best]
     while True:
         tried = [
@@ -114,7 +100,7 @@ def grow_set(
         ]
         every = [f for f in [*tried, _with_two_processes(spectrum, powers, best)] if f]
         seen += every
-        more = [f for f in every if _better(f, best)]
+        more = [f for f in every if predicts_better(f, best)]
         if not more:
             break
         best = max(more, key=lambda f: float(f.scores.sum()))
@@ -128,19 +114,8 @@ def grow_set(
 def _simplest(fits: list[NoiseFit]) -> NoiseFit:
     """The fit with fewest parameters that no other predicts clearly better than."""
     best = max(fits, key=lambda f: float(f.scores.sum()))
-    fewer = [f for f in fits if len(f.x) < len(best.x) and not _better(best, f)]
+    fewer = [f for f in fits if len(f.x) < len(best.x) and not predicts_better(best, f)]
     return _simplest(fewer) if fewer else best
-
-
-def _white_only(spectrum: CosineSpectrum, powers: Powers) -> NoiseFit:
-    used = ~powers.free
-    column = spectrum.fixed_columns["N"][used]
-    total = (powers.power[used].sum(axis=1) / column).sum() / powers.count[used].sum()
-    # white noise alone
-    found = fit_processes(spectrum, powers, ("N",), np.log([total]))
-    if found is None:
-        raise AssertionError("white noise is in every bin")
-    return found
 
 
 def _additions(terms: tuple[str, ...]) -> list[str]:
@@ -218,130 +193,3 @@ def _with_two_processes(
         return None
     one = _with_process(spectrum, powers, best, new[0])
     return one and _with_process(spectrum, powers, one, new[1])
-
-
-def _better(more: NoiseFit, less: NoiseFit) -> bool:
-    """Whether the gain of held-out coefficients exceeds its standard error.
-
-    Twice the gain in likelihood is noncentral chi squared: its standard error is twice
-    its root.
-    """
-    gain = float((more.scores - less.scores).sum())
-    likely = max(more.log_likelihood - less.log_likelihood, 0.0)
-    return bool(gain > np.sqrt(2 * likely))
-
-
-def without_filter(spectrum: CosineSpectrum, powers: Powers) -> Powers:
-    """Leave bins above a corner out of the fit, if that predicts better."""
-    top = spectrum.frequency.max()
-    best, chosen = fit_untimed_terms(spectrum, powers), powers
-    corner = top / 2
-    while corner >= FILTERED_HZ:
-        free = powers.free | (spectrum.frequency > corner)
-        tried = replace(powers, free=free)
-        found = fit_untimed_terms(spectrum, tried)
-        if _better(found, best):
-            best, chosen = found, tried
-        corner /= 2
-    filtered = chosen is not powers
-    chosen = _without_lines(spectrum, chosen, best)
-    while (octave := _octave(spectrum, chosen)).any():
-        below = replace(chosen, free=chosen.free | octave)
-        if abs(_excess_above(spectrum, chosen, below)) < BENT:
-            break
-        chosen, filtered = below, True
-    return _without_bend(spectrum, chosen) if filtered else chosen
-
-
-def _without_bend(spectrum: CosineSpectrum, powers: Powers) -> Powers:
-    """Leave out what a filter takes from bins below those that show it.
-
-    In each bin that is too little to be seen, and in all of them it is several standard
-    errors of the white noise. It is the bend of the next octave, and in means over
-    several samples the part of white noise that is folded from beyond the corner, where
-    a filtered device has none. Where too little would be left, white noise is not known
-    well enough for it to matter.
-    """
-    free = powers.free | _octave(spectrum, powers)
-    corner = float(spectrum.frequency[~free].max())
-    lacking = (spectrum.folded_share > FOLDED) & (spectrum.folded_from > corner)
-    left = replace(powers, free=free | lacking)
-    return left if left.count[~left.free].sum() >= MIN_LEFT else powers
-
-
-def _octave(spectrum: CosineSpectrum, powers: Powers) -> Flags:
-    """The highest octave of the bins that are fitted; none below a filter's corner."""
-    used = ~powers.free
-    corner = float(spectrum.frequency[used].max()) / 2
-    octave: Flags = used & (spectrum.frequency > corner)
-    return octave if corner >= FILTERED_HZ else np.zeros_like(used)
-
-
-def _excess_above(spectrum: CosineSpectrum, powers: Powers, below: Powers) -> float:
-    """Excess of bins over what those `below` predict, in standard errors."""
-    above = below.free & ~powers.free
-    found = fit_untimed_terms(spectrum, below)
-    power, count = (a[above].sum(axis=1) for a in (powers.power, powers.count))
-    slopes = expected_powers(spectrum, found.terms, found.x)[1][above]
-    slope = count @ slopes / count.sum()
-    variance = 2 / count.sum() + slope @ found.covariance @ slope
-    ratio = float(np.sum(power / found.level[above]) / count.sum())
-    return float((ratio - 1) / np.sqrt(variance * _dispersion(below, found)))
-
-
-def _without_lines(spectrum: CosineSpectrum, powers: Powers, rich: NoiseFit) -> Powers:
-    """Leave bins above 1 Hz with lines out of the fit."""
-    excess = _excess(powers, rich)
-    usual = MAD_TO_SIGMA * np.median(np.abs(excess[~powers.free]))
-    odd = (excess > 6 * max(1.0, usual)) & (spectrum.frequency > FILTERED_HZ)
-    return replace(powers, free=powers.free | odd)
-
-
-def fit_untimed_terms(spectrum: CosineSpectrum, powers: Powers) -> NoiseFit:
-    """Fit all processes without a correlation time, less those that vanish."""
-    used = ~powers.free
-    terms = list(UNTIMED_TERMS)
-    columns = np.array([spectrum.column(term) for term in UNTIMED_TERMS])[:, used]
-    sizes = _multiplicative_sizes(columns, powers.power[used].sum(axis=1),
-                                  powers.count[used].sum(axis=1))  # fmt: skip
-    while len(terms) > 1:
-        if found := fit_processes(spectrum, powers, tuple(terms), np.log(sizes)):
-            return found
-        # remove the process with the least part in any bin
-        parts = (sizes[:, None] * columns / (sizes @ columns)).max(axis=1)
-        gone = 1 + int(np.argmin(parts[1:]))
-        terms.pop(gone)
-        sizes, columns = np.delete(sizes, gone), np.delete(columns, gone, axis=0)
-    return _white_only(spectrum, powers)
-
-
-def _multiplicative_sizes(columns: Array, power: Array, count: Array) -> Array:
-    """Variances (p,) near their most likely ones, by multiplication.
-
-    Each step raises the likelihood (Fevotte and Idier 2011, Itakura-Saito).
-    """
-    sizes: Array = (power.sum() / count.sum()) / (columns.max(axis=1) * len(columns))
-    for _ in range(MULTIPLIED):
-        level = sizes @ columns
-        sizes *= np.sqrt(columns @ (power / level**2) / (columns @ (count / level)))
-    least: Array = np.maximum(sizes, 1e-12 * sizes.max())
-    return least
-
-
-def _excess(powers: Powers, found: NoiseFit) -> Array:
-    """Excess of each bin over the model, in standard errors, (b,)."""
-    count = powers.count.sum(axis=1)
-    ratio = powers.power.sum(axis=1) / np.maximum(count, 1e-300) / found.level
-    excess: Array = np.where(count > 0, (ratio - 1) * np.sqrt(count / 2), 0.0)
-    return excess
-
-
-def _dispersion(powers: Powers, found: NoiseFit) -> float:
-    """Mean squared excess of the bins that the model explains, at least 1."""
-    some: Flags = ~powers.free & (powers.count.sum(axis=1) > 1)
-    freedom = int(some.sum()) - len(found.x)
-    if freedom < 1:
-        return 1.0
-    squares = float(np.sum(_excess(powers, found)[some] ** 2)) / freedom
-    # exceeded by chance in one of forty
-    return squares if squares > 1 + 2 * np.sqrt(2 / freedom) else 1.0

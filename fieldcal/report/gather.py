@@ -13,7 +13,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import FieldcalError, InputError, SessionError
 from fieldcal.core.samples import Block
-from fieldcal.evaluation.observations import UsableWindows, usable_windows
+from fieldcal.evaluation.usable_windows import UsableWindows, usable_windows
 from fieldcal.session.folder import RESULT, Session
 
 DIAGNOSIS = "diagnosis.json"

@@ -15,7 +15,8 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import UsableWindows, build_observations
+from fieldcal.evaluation.observations import build_observations
+from fieldcal.evaluation.usable_windows import UsableWindows
 from fieldcal.model import thresholds
 from fieldcal.report.blocks import Figure, Paragraph, Section
 from fieldcal.report.blocks import ReportBlock as ReportBlock

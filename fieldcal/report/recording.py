@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.evaluation.observations import UsableWindows
+from fieldcal.evaluation.usable_windows import UsableWindows
 from fieldcal.report.blocks import Figure, Paragraph, ReportBlock, Section, Table, table
 from fieldcal.report.charts import SENSORS, ChartMark, LabelledSpan, RecordingChart
 from fieldcal.report.gather import ReportMaterial

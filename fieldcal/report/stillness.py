@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Block
-from fieldcal.evaluation.observations import UsableWindows
+from fieldcal.evaluation.usable_windows import UsableWindows
 from fieldcal.evaluation.window_mean import table_rate, without_table_rotation
 from fieldcal.report import blocks
 from fieldcal.report.blocks import Cell, Figure, Section, Tone, table

@@ -11,9 +11,9 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.evaluation.interim_result import InterimResult
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_prepared
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 
 

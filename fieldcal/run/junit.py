@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fieldcal.core.escaping import escape_invisible
 from fieldcal.core.positions import Position
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 TROUBLE_MARKS = ("wrong", "rejected", "kept")
 """Marks of faults in a position."""

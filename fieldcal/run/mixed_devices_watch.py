@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.session.mixed_devices import GIVE_EACH_A_PORT, difference_text
-from fieldcal.windows.alternation import alternating_means
+from fieldcal.session.mixed_devices import GIVE_EACH_A_PORT, mixed_samples_text
 
 LOOKED_AT = 200
 """Samples that are looked at together."""
@@ -34,10 +33,7 @@ class MixedDevicesWatch:
         self._count += len(block.t)
         if self._count < LOOKED_AT:
             return
-        means = alternating_means(np.vstack(self._kept))
+        said = mixed_samples_text(np.vstack(self._kept))
         self._kept, self._count = [], 0
-        if means is not None:
-            self.notice = (
-                "two devices seem to send on one port: the samples change to and fro"
-                f" in {difference_text(means)}; end this (q), and {GIVE_EACH_A_PORT}"
-            )
+        if said:
+            self.notice = f"{said}; end this (q), and {GIVE_EACH_A_PORT}"

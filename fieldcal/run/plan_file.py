@@ -21,7 +21,7 @@ from fieldcal.acceptance.verification import planned_verification
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, PlanError
 from fieldcal.core.positions import Position, specific_forces
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.description import Description
 from fieldcal.session.position_tables import position_table
 from fieldcal.session.schemas import (
@@ -147,7 +147,7 @@ def task_from_tables(tables: Mapping[str, Any], name: str) -> PlanTask:
     if "position" not in tables and "procedure" in run:
         tables = {**tables, "position": default_positions(run["procedure"])}
     try:
-        about = description.parse_description(tables)
+        about = description_file.parse_description(tables)
     except InputError as error:
         raise PlanError(f"{name}: {error}") from error
     _check_positions(about, name)

@@ -14,7 +14,7 @@ from fieldcal.core.errors import (
     SessionError,
 )
 from fieldcal.core.positions import Position
-from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.run.plan_file import PlanTask
 from fieldcal.session.folder import RESULT, Session
 from fieldcal.session.marks import POSITION_ADDED, taken_windows

@@ -36,7 +36,7 @@ from fieldcal.run.judging import judge_session
 from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, PlanTask
 from fieldcal.run.warm_up import WarmUpWatch
-from fieldcal.session.description import with_added_positions
+from fieldcal.session.description_file import with_added_positions
 from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average

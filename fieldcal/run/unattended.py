@@ -9,13 +9,13 @@ from typing import Any
 
 from fieldcal.calibration import Calibration, limits
 from fieldcal.drivers.driver import Driver
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.run import plan_file
 from fieldcal.run.movers import VirtualMover
 from fieldcal.run.operator.script import ScriptOperator
 from fieldcal.run.session_run import SessionRun
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 
@@ -47,7 +47,7 @@ def recalibrate(
         "frame": {"mounting": truth["mounting"]},
     }
     whole = {
-        "format": description.FORMAT_VERSION,
+        "format": description_file.FORMAT_VERSION,
         **known,
         "position": plan_file.default_positions(procedure),
         "run": {"procedure": procedure, "seconds": seconds},

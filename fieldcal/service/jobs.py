@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.service.bounds import ServiceBounds
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 from fieldcal.session.lock import SessionLock
 
 JobState = Literal["waiting", "working", "done", "failed"]

@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from fieldcal.core.errors import InputError
 from fieldcal.core.escaping import escape_line
 from fieldcal.service.bounds import MIB, ServiceBounds
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.folder import DESCRIPTION
 
 BYTES_AT_ONCE = MIB
@@ -156,7 +156,7 @@ def unpack(
         raise InputError(
             f"the archive cannot be unpacked: {error.strerror}; send it again later"
         ) from error
-    about = description.read_description(folder / DESCRIPTION)
+    about = description_file.read_description(folder / DESCRIPTION)
     run = about.raw.get("run")
     if isinstance(run, Mapping) and "limits" in run:
         raise InputError(

@@ -29,7 +29,8 @@ from fieldcal.service.limits import TimeUsedUp, resource_limits
 from fieldcal.service.own_process import run_in_own_process
 from fieldcal.service.records import station_record
 from fieldcal.service.upload import archive_members, session_members, unpack
-from fieldcal.session.folder import RESULT, Session, write_atomically
+from fieldcal.session.file_writing import write_atomically
+from fieldcal.session.folder import RESULT, Session
 from fieldcal.session.integrity import DIAGNOSIS
 
 IMPORT_OPTIONS = {

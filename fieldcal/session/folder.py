@@ -11,10 +11,7 @@ results are written to files of their own.
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.core.errors import SessionError, disk_says
+from fieldcal.core.errors import SessionError
 from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, impossible_rate_text
-from fieldcal.session import description, sample_files
+from fieldcal.session import description_file, sample_files
 from fieldcal.session.blank_samples import (
     are_lost,
     blank_rows,
@@ -37,6 +34,7 @@ from fieldcal.session.blank_samples import (
 )
 from fieldcal.session.clock_steps import ClockStepRemover, remove_clock_steps
 from fieldcal.session.description import Description
+from fieldcal.session.file_writing import write_atomically
 from fieldcal.session.installed_calibration import (
     installed_stretches,
     nominal_as_sent,
@@ -79,7 +77,7 @@ class Session:
         """
         folder = Path(folder)
         refuse_undecodable_path(folder)
-        about = description.read_description(folder / DESCRIPTION)
+        about = description_file.read_description(folder / DESCRIPTION)
         says: list[str] = []
         marks = list(read_marks(folder / MARKS, says))
         says += _guess_warnings(about.raw)
@@ -259,7 +257,7 @@ def _with_added_positions(
 ) -> Description:
     """The description with the positions that were added during the run appended."""
     added = [mark for mark in marks if mark.get("event") == POSITION_ADDED]
-    return description.with_added_positions(about, parse_positions(added)[0])
+    return description_file.with_added_positions(about, parse_positions(added)[0])
 
 
 def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:
@@ -280,48 +278,3 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
     ]
     without = tuple(sorted((*about.excluded_spans, *gaps)))
     return replace(about, windows=tuple(windows), excluded_spans=without)
-
-
-def check_writable(path: Path) -> None:
-    """Refuse a file that cannot be written, before long work whose result it takes.
-
-    Raises
-    ------
-    SessionError
-        If it is a folder, or nothing can be written beside it.
-
-    """
-    if path.is_dir():
-        raise SessionError(f"{path}: is a folder: name a file in it")
-    try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
-            pass
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be written: {disk_says(error)}") from error
-
-
-def write_atomically(path: Path, content: str | bytes) -> Path:
-    """Replace a file atomically: a reader finds the old content or the new one.
-
-    Raises
-    ------
-    SessionError
-        If it cannot be written.
-
-    """
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content.encode() if isinstance(content, str) else content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.chmod(name, 0o644)
-            os.replace(name, path)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                os.unlink(name)
-            raise
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be written: {disk_says(error)}") from error
-    return path

@@ -14,7 +14,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.file_names import refuse_undecodable_path
-from fieldcal.session import description, sample_files
+from fieldcal.session import description_file, sample_files
 from fieldcal.session.folder import DESCRIPTION, RESULT
 from fieldcal.session.marks import MARKS, read_marks
 from fieldcal.session.schemas import validator
@@ -64,7 +64,7 @@ def file_faults(folder: Path) -> Iterator[FileFault]:
 def _description(folder: Path) -> Iterator[FileFault]:
     path = folder / DESCRIPTION
     try:
-        description.read_description(path)
+        description_file.read_description(path)
     except SessionError as error:
         if not path.exists():
             raise

@@ -6,7 +6,8 @@ the device is silent. Every `SYNC_INTERVAL` seconds they are written to the disk
 are appended one line at a time, each with its checksum. Both files grow by whole pieces
 only: a piece that is written in part is removed. So after a kill everything up to the
 last fifth of a second can be read, and an interrupted recording can be continued: what
-follows its last whole batch is cut off, and the next batch is appended.
+follows its last whole batch is cut off, and the next batch is appended. The session has
+a random id from its beginning, by which its copies are known whenever they were made.
 
 All writing is done in one thread of its own. A Ctrl-C may come between any two
 instructions of the main thread: it ends the waiting for a piece to be written, and
@@ -16,7 +17,6 @@ never comes between its bytes and what is remembered of them.
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -24,16 +24,20 @@ from pathlib import Path
 from threading import Event, Lock, Thread
 from time import monotonic, time
 from typing import Any, Self
+from uuid import uuid4
 
 import numpy as np
 
 from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.samples import Block, concat
-from fieldcal.session.folder import DESCRIPTION, write_atomically
+from fieldcal.session.append_only_file import AppendOnlyFile
+from fieldcal.session.file_writing import write_atomically
+from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
-from fieldcal.session.sample_files import read_samples, samples_schema, to_record_batch
+from fieldcal.session.sample_files import read_samples
+from fieldcal.session.sample_table import samples_schema, to_record_batch
 
 FLUSH_INTERVAL = 0.2
 """Longest time that samples are kept in memory only, s of the host's clock."""
@@ -49,41 +53,6 @@ SAMPLES = "samples.arrows"
 
 LEAST_BREAK = 1.0
 """Least gap in the times after a lost link, s of device time."""
-
-
-class _AppendOnlyFile:
-    """A file to which whole pieces are appended.
-
-    Parameters
-    ----------
-    path : of the file
-    size : bytes of it to keep; None creates it, or raises FileExistsError
-
-    """
-
-    def __init__(self, path: Path, size: int | None = None) -> None:
-        how = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0)
-        self.fd = os.open(path, how | (os.O_EXCL if size is None else 0), 0o644)
-        self._size = size or 0
-        os.ftruncate(self.fd, self._size)
-
-    def append(self, data: bytes) -> None:
-        """Write all of it, or nothing and raise OSError."""
-        left = memoryview(data)
-        try:
-            while left:
-                left = left[os.write(self.fd, left) :]
-        except OSError:
-            with contextlib.suppress(OSError):
-                os.ftruncate(self.fd, self._size)
-            raise
-        self._size += len(data)
-
-    def sync(self) -> None:
-        os.fsync(self.fd)
-
-    def close(self) -> None:
-        os.close(self.fd)
 
 
 class Recorder:
@@ -159,10 +128,12 @@ class Recorder:
         names = (DESCRIPTION, SAMPLES, MARKS)
         if any((self.folder / name).exists() for name in names):
             raise FileExistsError
-        self._samples = _AppendOnlyFile(self.folder / SAMPLES)
+        self._samples = AppendOnlyFile(self.folder / SAMPLES)
+        # that of a plan which is a session.toml is another run's
+        whole = {**about, "recording": {"id": uuid4().hex}}
         try:
-            write_atomically(self.folder / DESCRIPTION, tomlkit.dumps(about))
-            self._marks = _AppendOnlyFile(self.folder / MARKS)
+            write_atomically(self.folder / DESCRIPTION, tomlkit.dumps(whole))
+            self._marks = AppendOnlyFile(self.folder / MARKS)
         except BaseException:
             # empty files must not prevent the next attempt
             self._samples.close()
@@ -187,10 +158,10 @@ class Recorder:
             self.link_reopened()
         else:
             self._encoder = ArrowEncoder(samples_schema())
-        self._samples = _AppendOnlyFile(path, end)
+        self._samples = AppendOnlyFile(path, end)
         marks = self.folder / MARKS
         lines = marks.read_bytes() if marks.exists() else b""
-        self._marks = _AppendOnlyFile(marks, lines.rfind(b"\n") + 1)
+        self._marks = AppendOnlyFile(marks, lines.rfind(b"\n") + 1)
 
     def link_reopened(self) -> None:
         """Note that the link was opened again: the device may have restarted."""

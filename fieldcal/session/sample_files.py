@@ -25,6 +25,7 @@ from fieldcal.session.text_files import (
 
 if TYPE_CHECKING:
     import pyarrow as pa
+from fieldcal.session.sample_table import block_from_columns, samples_schema
 
 ENDINGS = (".arrows", ".parquet", ".csv", ".csv.gz")
 
@@ -73,7 +74,7 @@ def read_samples(path: Path) -> tuple[Block, tuple[str, ...]]:
     del table  # an hour of samples need not be in memory three times
     _check_columns(path, columns)
     _check_rows(path, columns)
-    return _block(columns), warnings
+    return block_from_columns(columns), warnings
 
 
 def iterate_samples(path: Path, says: list[str] | None = None) -> Iterator[Block]:
@@ -105,7 +106,7 @@ def iterate_samples(path: Path, says: list[str] | None = None) -> Iterator[Block
                 read_samples(path)  # raises an error that says where
             last = float(t[-1]) if len(t) else last
             rows += len(t)
-            yield from _parts(_block(columns))
+            yield from _parts(block_from_columns(columns))
     except (pa.ArrowException, OSError):
         # raises an error that says what is wrong and where, unless its end is missing
         whole, warnings = read_samples(path)
@@ -279,55 +280,3 @@ def _check_rows(path: Path, columns: dict[str, Array]) -> None:
             f"{path}: row {row + 2}, column t: {t[row + 1]:g} s is {how} the row above"
             f" ({t[row]:g} s); put the rows in time order, each time once"
         )
-
-
-def _block(columns: dict[str, Array]) -> Block:
-    """Samples from columns; `columns` is emptied."""
-    unknown = np.full(len(columns["t"]), np.nan)
-    triad = {
-        kind: np.column_stack([columns.pop(kind + axis, unknown) for axis in "xyz"])
-        for kind in "ag"
-    }
-    rest = [columns.get(n, unknown) for n in ("temperature", "seq", "t_host")]
-    return Block(columns["t"], triad["a"], triad["g"], *rest)
-
-
-def block_from_table(table: pa.Table) -> Block:
-    """Samples of a table with `SAMPLE_COLUMNS` that was written here."""
-    return _block({n: float_values(table.column(n)) for n in table.column_names})
-
-
-def samples_schema() -> pa.Schema:
-    """Columns of a samples file that is written here."""
-    import pyarrow as pa
-
-    return pa.schema([(name, pa.float64()) for name in SAMPLE_COLUMNS])
-
-
-def to_record_batch(block: Block, *, nulls: bool = False) -> pa.RecordBatch:
-    """The samples as an Arrow record batch with all of `SAMPLE_COLUMNS`.
-
-    With `nulls`, a column without any value is null, and takes no space in Parquet. In
-    a stream it would still take space, which no checksum covers.
-    """
-    import pyarrow as pa
-
-    columns = [block.t, *block.acc.T, *block.gyr.T]
-    columns += [block.temperature, block.t_host, block.seq]
-    # pa.array imports pandas where it is installed, which takes long
-    arrays = [
-        pa.nulls(len(block), pa.float64())
-        if nulls and _unknown(c)
-        else pa.Array.from_buffers(
-            pa.float64(),
-            len(block),
-            [None, pa.py_buffer(np.ascontiguousarray(c, dtype=float))],
-        )
-        for c in columns
-    ]
-    return pa.RecordBatch.from_arrays(arrays, names=list(SAMPLE_COLUMNS))
-
-
-def _unknown(column: Array) -> bool:
-    one = column[:1] if not any(column.strides) else column  # one number for all
-    return bool(len(column) and np.isnan(column[0]) and np.isnan(one).all())

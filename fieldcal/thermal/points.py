@@ -18,7 +18,8 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import ParameterName
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import parameter_names
 
 TRIAD_OF_GROUP = {"cross_coupling": "acc", "gyro_cross_coupling": "gyr"}
 

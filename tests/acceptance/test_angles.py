@@ -19,7 +19,8 @@ from fieldcal.acceptance.verification import Verification, verify
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.core.samples import Array
-from fieldcal.session.description import Description, parse_description
+from fieldcal.session.description import Description
+from fieldcal.session.description_file import parse_description
 from fieldcal.solve import solve
 from fieldcal.windows import Average
 

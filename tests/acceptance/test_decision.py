@@ -28,16 +28,16 @@ from fieldcal.core.positions import (
     WIDE_POSITIONS,
     Position,
 )
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.history.family import next_run_distribution
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.windows import Average
 
 G = 9.81
-ABOUT = description.parse_description({"site": {"gravity": G}})
+ABOUT = description_file.parse_description({"site": {"gravity": G}})
 BOUNDS = limits.read("tactical")
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 LINK = {"samples": 10000, "missing": 0, "bad": 0}
@@ -382,14 +382,14 @@ def test_a_gyroscopes_scale_that_is_loosely_known_is_not_worse_than_none(
 def test_gravity_that_nobody_said_is_no_go_and_one_that_was_is_not() -> None:
     known = {"temperatures": [21.0], "link": LINK}
     seen = Circumstances(**known)  # type: ignore[arg-type]
-    unsaid = decide(calibration(), description.parse_description({}), BOUNDS, seen)
+    unsaid = decide(calibration(), description_file.parse_description({}), BOUNDS, seen)
     assert not unsaid.go and len(unsaid.reasons) == 1
     assert "--latitude" in unsaid.reasons[0] and "9.780 m/s²" in unsaid.reasons[0]
     for site in ({"latitude_deg": 0.0}, {"gravity": G}):
-        about = description.parse_description({"site": site})
+        about = description_file.parse_description({"site": site})
         assert decide(calibration(), about, BOUNDS, seen).go
     gyroscopes = _only(calibration(), ("gyr_bias",))
-    made = decide(gyroscopes, description.parse_description({}), BOUNDS, seen)
+    made = decide(gyroscopes, description_file.parse_description({}), BOUNDS, seen)
     assert "site" not in [check.name for check in made.checks]
 
 
@@ -422,7 +422,7 @@ def test_a_position_that_was_not_fitted_is_a_witness() -> None:
     found = calibration()
     found = replace(found, info={**found.info, "bad_position": chances})
     assert "witnesses" in [c.name for c in decided(found).checks if c.ok is False]
-    about = description.parse_description({"site": {"gravity": G}})
+    about = description_file.parse_description({"site": {"gravity": G}})
     held = Position.deg(30, 0)
     truth = 0.1 + np.array([-G * np.sin(np.pi / 6), -G * np.cos(np.pi / 6), 0.0])
     mean = np.concatenate([truth, np.full(3, 0.01)])
@@ -446,7 +446,7 @@ def test_frames_are_those_of_the_whole_run() -> None:
 
 @pytest.mark.parametrize("missing", ["residual", "sigma"])
 def test_a_verification_that_was_not_measured_verifies_nothing(missing: str) -> None:
-    about = description.parse_description({"site": {"gravity": G}})
+    about = description_file.parse_description({"site": {"gravity": G}})
     mean = np.concatenate([[0.1, 0.1 - G, 0.1], np.full(3, 0.01)])
     cov = np.eye(6) * 1e-8
     if missing == "residual":

@@ -17,14 +17,14 @@ from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.grade import Grade
 from fieldcal.core.positions import FIVE_POSITIONS, SIX_FACES, Position, specific_forces
 from fieldcal.core.samples import Array
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
 from fieldcal.solve.estimation import RecordedRows, estimate_parameters
 from fieldcal.solve.parameter_set import ParameterSetOptions
 
 TACTICAL = limits.read("tactical")
-ABOUT = description.parse_description({"format": 1})
+ABOUT = description_file.parse_description({"format": 1})
 G = 9.81
 NINE = tuple(Position.deg(a, b) for a in (-45, 0, 45) for b in (-30, 0, 30))
 SEEDS = [0, *(pytest.param(s, marks=pytest.mark.thorough) for s in (1, 2, 3))]
@@ -217,7 +217,7 @@ def test_a_size_in_another_unit_is_refused(left: dict[str, float]) -> None:
 def test_the_grade_says_what_nobody_states(
     device: dict[str, object], left: tuple[float, float, float]
 ) -> None:
-    about = description.parse_description({"format": 1, "device": device})
+    about = description_file.parse_description({"format": 1, "device": device})
     found = factory_errors(about)
     assert (found.cross_coupling, found.quadratic, found.g_sensitivity) == left
 

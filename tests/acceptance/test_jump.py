@@ -11,7 +11,7 @@ import pytest
 from fieldcal.acceptance.decision import Circumstances, decide
 from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.calibration import Calibration, limits
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 BOUNDS = limits.read("tactical")
 REPEAT = {"acc_bias": BOUNDS.acc_bias_repeat, "gyr_bias": BOUNDS.gyr_bias_repeat}

@@ -15,8 +15,8 @@ from fieldcal.acceptance.remedy import cheapest_remedy
 from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, ladder_settings
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import NoiseFigures, Profile
 

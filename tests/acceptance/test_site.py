@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from fieldcal.acceptance.site import gravity_contradiction
-from fieldcal.session.description import Description, parse_description
+from fieldcal.session.description import Description
+from fieldcal.session.description_file import parse_description
 
 
 def at(**site: Any) -> Description:

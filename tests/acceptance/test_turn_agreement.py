@@ -10,7 +10,7 @@ import pytest
 from fieldcal.acceptance.decision import Circumstances, decide
 from fieldcal.acceptance.turn_agreement import turn_disagreement
 from fieldcal.calibration import Calibration, limits
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 BOUNDS = limits.read("tactical")
 

@@ -8,7 +8,7 @@ import numpy as np
 import strapdown
 
 from fieldcal.core.samples import Block
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 DEVICE: dict[str, Any] = {
     "bias": {"acc": [0.05, -0.03, 0.1], "gyr": [1e-3, -2e-3, 5e-4]},
@@ -24,7 +24,7 @@ def played(device: dict[str, Any], seed: int, later: float = 0.0) -> tuple[Any, 
     block = Block.of(
         table[:, 0] + later, table[:, 1:4], table[:, 4:7], unknown, unknown, unknown
     )
-    about = description.parse_description(
+    about = description_file.parse_description(
         {
             "format": 1,
             "site": {"gravity": strapdown.GRAVITY},

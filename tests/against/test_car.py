@@ -12,7 +12,7 @@ from fieldcal.against.motion.alignment import align_motion
 from fieldcal.against.motion.held import holds_positions
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
-from fieldcal.session import description
+from fieldcal.session import description, description_file
 from fieldcal.session.folder import Session
 
 PHONE = "t=accelerometer_t," + ",".join(
@@ -63,7 +63,7 @@ def calm(directions: list[list[float]], angles: bool) -> tuple[Block, object]:
         | ({"alpha_deg": 0.0, "beta_deg": 0.0} if angles else {})
         for i in range(len(directions))
     ]
-    about = description.parse_description({"format": 1, "position": tables})
+    about = description_file.parse_description({"format": 1, "position": tables})
     return Block.of(t, acc), about
 
 

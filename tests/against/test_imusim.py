@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from fieldcal.against import compare
 from fieldcal.core.samples import Array, Block
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 G = 9.8
 """Gravity of that simulator, m/s^2."""
@@ -39,7 +39,7 @@ def described(table: Array) -> tuple[Block, Any]:
         table[:, 0], table[:, 1:4], table[:, 4:], unknown, unknown, unknown
     )
     about = {"format": 1, "site": {"gravity": G}, "position": strapdown.schedule()}
-    return block, description.parse_description(about)
+    return block, description_file.parse_description(about)
 
 
 @pytest.mark.thorough

@@ -31,7 +31,7 @@ from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.effects import catalogue as known
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 from fieldcal.sim_device.effects import catalogue, kind
 from fieldcal.sim_device.profile_file import profile_from_tables
 from fieldcal.sim_device.replay import HeldWindow, simulate

@@ -21,7 +21,7 @@ from fieldcal.against.prediction import chi2_of_uncertain_prediction
 from fieldcal.against.side import sample_noise
 from fieldcal.core.samples import Array, Block
 from fieldcal.model import priors
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 SIGMA = 0.01
 SHARE = priors.density()
@@ -181,7 +181,7 @@ def test_what_a_simulator_does_not_know_is_no_misfit() -> None:
 
 
 def test_the_noise_of_a_window_is_known_as_well_as_is_said() -> None:
-    about = description.parse_description(
+    about = description_file.parse_description(
         {"format": 1, "position": [{"start_s": 0.0, "end_s": 2.0}]}
     )
     rng, seen = np.random.default_rng(9), []

@@ -22,7 +22,7 @@ from fieldcal.cli import main
 from fieldcal.commands.console import EscapingConsole
 from fieldcal.core.escaping import INVISIBLE_CATEGORIES, escape_invisible, escape_line
 from fieldcal.run import junit
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.sim_device.profile import Profile
 
 EVIL = "\x1b]0;GO\x07\x1b[2J\x9b31m\u202e[link=http://x]up[/link][/]\r\x08"
@@ -140,7 +140,7 @@ def test_names_of_arrays_and_of_files(said: Said, tmp_path: Path) -> None:
 
 @given(st.text(), st.text())
 def test_junit_is_well_formed_whatever_a_name_holds(name: str, text: str) -> None:
-    about = description.parse_description(
+    about = description_file.parse_description(
         {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "name": name}]}
     )
     marks = [{"event": "wrong", "position": 0, "text": text}]

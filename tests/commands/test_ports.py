@@ -138,6 +138,35 @@ def test_rates_whose_unit_nothing_tells_are_said_to_be_open() -> None:
     assert "gyr_unit" not in found.url and "add &gyr_unit=deg/s" in found.says
 
 
+def two_imus(apart: float) -> Say:
+    """Lines of two IMUs that lie side by side, with other biases, by turns."""
+    rng = np.random.default_rng(6)
+    at_rest = np.array([0.1, -0.2, 9.8, 0.01, -0.02, 0.005])
+    other = apart * np.array([0.4, 0.3, -0.2, 0.02, -0.01, 0.01])
+    noise = np.array([0.02] * 3 + [1e-3] * 3)
+    rows = at_rest + noise * rng.standard_normal((1000, 6))
+    rows[1::2] += other
+    return lambda i: b"%.4f,%.4f,%.4f,%.5f,%.5f,%.5f\n" % tuple(rows[i % 1000])
+
+
+def test_two_devices_on_one_port_are_said(capsys: pytest.CaptureFixture[str]) -> None:
+    with talking(two_imus(1.0)) as port:
+        assert main(["ports", "--probe", "--seconds", "0.5", "--json", port]) == 0
+        (entry,) = json.loads(capsys.readouterr().out)["ports"]
+    says = entry["answer"]["says"]
+    assert re.search(r"two devices seem to send on one port.*gx by 0\.02 rad/s", says)
+    assert "give each a port, names or a frame of its own" in says
+    with talking(two_imus(0.0)) as port:
+        assert "two devices" not in probe_port(port, 0.5).says
+
+
+@pytest.mark.parametrize("name", sorted(set(STREAMS) - {"text"}))
+def test_one_device_of_any_format_is_not_said_to_be_two(name: str) -> None:
+    data = b"".join(STREAMS[name](200, np.random.default_rng(1)).pieces)
+    found = module._identify("/dev/x", 115200, data, took=1.0)
+    assert found is not None and "two devices" not in found.says
+
+
 def test_the_table_says_how_to_use_it(capsys: pytest.CaptureFixture[str]) -> None:
     with talking(sample("witmotion")) as port:
         assert main(["ports", "--probe", "--seconds", "0.5", port]) == 0

@@ -15,7 +15,7 @@ from fieldcal.cli import main
 from fieldcal.commands.run import add_arguments
 from fieldcal.commands.run_statements import write_statements
 from fieldcal.core.errors import InputError, SessionError
-from fieldcal.session.description import read_description
+from fieldcal.session.description_file import read_description
 from fieldcal.session.marks import mark_line
 from fieldcal.session.recorder import Recorder
 

@@ -15,10 +15,10 @@ from session_folders import recorded, write_session
 from fieldcal.core import base_motion
 from fieldcal.core.base_motion import BaseMotion
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_session
-from fieldcal.session import description
+from fieldcal.evaluation.usable_windows import usable_windows
+from fieldcal.session.description_file import parse_description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import earth
 from fieldcal.sim_device import profile as device
@@ -58,7 +58,7 @@ def test_a_base_that_stands_adds_nothing() -> None:
 def test_what_a_session_says() -> None:
     """Gravity is less by what sailing east takes; tactical grade knows no north."""
     still, moving = (
-        description.parse_description({"format": 1, "site": {"latitude_deg": 55.0} | v})
+        parse_description({"format": 1, "site": {"latitude_deg": 55.0} | v})
         for v in ({}, {"east_m_s": 20.0, "north_m_s": 10.0, "level_deg": 0.01})
     )  # fmt: skip
     adds = BaseMotion.from_velocity(10.0, 20.0, np.deg2rad(55.0))
@@ -69,7 +69,7 @@ def test_what_a_session_says() -> None:
         np.hypot(0.01, np.rad2deg(adds.force_tilt))
     )
     with pytest.raises(Exception, match="north_m_s"):
-        description.parse_description({"format": 1, "site": {"north_m_s": "fast"}})
+        parse_description({"format": 1, "site": {"north_m_s": "fast"}})
 
 
 def session(folder: Path, **said: Any) -> Session:

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from fieldcal.core.rotation import (
     cross,
     cross_matrix,
+    nearest_rotation,
     rotation_matrices,
     rotation_vectors,
 )
@@ -54,3 +55,13 @@ def test_rotation_vectors_are_those_of_their_matrices_up_to_half_a_turn() -> Non
     np.testing.assert_allclose(
         np.abs(rotation_vectors(half)), [0.0, np.pi, 0.0], atol=1e-15
     )
+
+
+def test_the_nearest_rotation_aligns_vectors_and_mirrors_none() -> None:
+    rng = np.random.default_rng(6)
+    for count in (2, 3, 8):
+        x, y = rng.standard_normal((2, count, 3))
+        expected = Rotation.align_vectors(y, x)[0].as_matrix()
+        np.testing.assert_allclose(nearest_rotation(y.T @ x), expected, atol=1e-9)
+    mirrored = nearest_rotation(np.diag([1.0, 2.0, -0.1]))
+    np.testing.assert_allclose(mirrored, np.eye(3), atol=1e-12)

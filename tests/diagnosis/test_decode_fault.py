@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import CHANNELS, Block
 from fieldcal.diagnosis.signal.chain import check_chain
 from fieldcal.effects.decode_fault import undo_decode_fault
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 LSB = np.repeat([16 * 9.80665 / 2**15, np.deg2rad(1000) / 2**15], 3)
 """Steps of a device of 16 g and 1000 deg/s."""
@@ -45,7 +45,7 @@ def with_six(block: Block, six: NDArray[np.floating]) -> Block:
 )
 def test_each_count_is_what_it_was(kind: str, bias: float) -> None:
     device = replace(TACTICAL, acc_noise=0.01, acc_bias=(bias, -0.1, bias))
-    about = description.parse_description(tables(device))
+    about = description_file.parse_description(tables(device))
     block = record(device, ride(device, seed=3))
     counts = np.round(block.six / LSB).astype(np.int64)
     whole, tried = counts * LSB, 0
@@ -66,7 +66,7 @@ def test_each_count_is_what_it_was(kind: str, bias: float) -> None:
 
 
 def test_single_wild_values_are_replaced_at_rest_and_on_the_way() -> None:
-    about = description.parse_description(tables(TACTICAL))
+    about = description_file.parse_description(tables(TACTICAL))
     ridden = ride(TACTICAL, seed=3)
     block = record(TACTICAL, ridden)
     rng, six = np.random.default_rng(4), block.six
@@ -93,7 +93,7 @@ def test_single_wild_values_are_replaced_at_rest_and_on_the_way() -> None:
 
 def test_what_shakes_a_device_is_no_wild_value() -> None:
     """Random shaking of 4 m/s^2 in one window: each sample jumps."""
-    about = description.parse_description(tables(TACTICAL))
+    about = description_file.parse_description(tables(TACTICAL))
     ridden = ride(TACTICAL, seed=3)
     block, rng = record(TACTICAL, ridden), np.random.default_rng(2)
     six, shaken = block.six, ridden.held == 4
@@ -111,7 +111,7 @@ def test_shaking_that_is_rectified_has_a_long_tail_and_is_no_wild_value(
     seed: int,
 ) -> None:
     """Its square is chi-squared: some samples of thousands go eleven times as far."""
-    about = description.parse_description(tables(TACTICAL))
+    about = description_file.parse_description(tables(TACTICAL))
     ridden = ride(TACTICAL, seed=3)
     block, rng = record(TACTICAL, ridden), np.random.default_rng(seed)
     six = block.six
@@ -126,7 +126,7 @@ def test_shaking_that_is_rectified_has_a_long_tail_and_is_no_wild_value(
 
 def test_wild_values_that_come_often_are_found_among_each_other() -> None:
     """Every thirtieth sample is one, so a tenth departs from those beside it."""
-    about = description.parse_description(tables(TACTICAL))
+    about = description_file.parse_description(tables(TACTICAL))
     ridden = ride(TACTICAL, seed=3)
     block = record(TACTICAL, ridden)
     lost = np.flatnonzero(ridden.held >= 0)[10:-10:30]
@@ -142,7 +142,7 @@ def test_wild_values_that_come_often_are_found_among_each_other() -> None:
 @pytest.mark.parametrize("push", [2.0, 90.0])
 def test_a_knock_on_the_way_is_no_wild_value(push: float) -> None:
     """It moves the device; at rest 2 m/s^2 of one sample may as well be noise."""
-    about = description.parse_description(tables(TACTICAL))
+    about = description_file.parse_description(tables(TACTICAL))
     ridden = ride(TACTICAL, seed=3)
     block = record(TACTICAL, ridden)
     held = ridden.held >= 0
@@ -160,7 +160,7 @@ def test_steps_however_coarse_are_no_slip(steps: float) -> None:
     size = np.repeat([steps, steps / 100], 3)
     six = np.round(block.six / size) * size
     told = check_chain(
-        with_six(block, six), description.parse_description(tables(TACTICAL))
+        with_six(block, six), description_file.parse_description(tables(TACTICAL))
     )
     assert "decode_fault" not in told.ids
 

@@ -16,7 +16,7 @@ from closed_circle import every_effect
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis import Diagnosis, diagnose
 from fieldcal.effects import catalogue
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.description import Description
 from fieldcal.sim_device.effect import Example
 from fieldcal.sim_device.effects import kind
@@ -115,7 +115,7 @@ def _about(profile: Profile, windows: list[HeldWindow]) -> Description:
         table = {"alpha_deg": alpha, "beta_deg": beta, "start_s": w.start}
         table |= {"end_s": w.end, "rate_deg_s": np.rad2deg(w.rate).tolist()}
         positions.append(table)
-    return description.parse_description(
+    return description_file.parse_description(
         {
             "format": 1,
             "device": {"name": "contract", "grade": profile.device.grade},

@@ -7,7 +7,7 @@ import pytest
 
 from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 from fieldcal.sim_device.profile import Profile, Sampling
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import checked_effect

@@ -13,8 +13,8 @@ from session_folders import places, recorded, write_session
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.chain import check_chain
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile
 

@@ -32,7 +32,7 @@ from fieldcal.procedures import two_position
 from fieldcal.run import movers
 from fieldcal.run.engine import Engine
 from fieldcal.run.operator.script import ScriptOperator
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.line_faults import LineFaults
@@ -114,7 +114,7 @@ def test_a_calibration_over_can_finds_the_truth_within_its_uncertainty(
     angles = [p.degrees or (0.0, 0.0) for p in two_position.POSITIONS]
     where = [{"alpha_deg": alpha, "beta_deg": beta} for alpha, beta in angles]
     site = {"latitude_deg": 50.45, "height_m": 170.0}
-    about = description.parse_description({"site": site, "position": where})
+    about = description_file.parse_description({"site": site, "position": where})
     options = ["--can", "slcan", "--speed", "max", "--latitude=50.45", "--height=170"]
     with (
         movers.VirtualMover(options) as device,

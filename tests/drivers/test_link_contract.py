@@ -28,7 +28,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.drivers import codec
 from fieldcal.drivers.driver import Driver, LinkHealth, open_driver
 from fieldcal.evaluation.observations import build_observations
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.sim_device.remote import RemoteDevice
 from fieldcal.solve import solve
 from fieldcal.windows import average
@@ -62,7 +62,7 @@ WINDOWS = (0.0, 27.0), (33.0, 59.5)
 
 SITE = {"latitude_deg": 50.45, "height_m": 170.0}
 WHERE = [{"alpha_deg": 0.0, "beta_deg": 0.0}, {"alpha_deg": 45.0, "beta_deg": 5.0}]
-ABOUT = description.parse_description({"site": SITE, "position": WHERE})
+ABOUT = description_file.parse_description({"site": SITE, "position": WHERE})
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.chain import check_chain
 from fieldcal.physics.recording import Rows
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 HZ, N, G = 50.0, 1000, 9.8
 

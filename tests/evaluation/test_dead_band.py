@@ -10,8 +10,8 @@ import pytest
 from session_folders import places, recorded, write_session
 
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile, Truth
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from session_folders import CALM, FACES, places, recorded, write_session
 
-from fieldcal.evaluation.observations import observe, usable_windows
+from fieldcal.evaluation.observations import observe
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from session_folders import CALM, places, recorded, write_session
 
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 
 LADDER = [(0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (0.0, 5.0), (0.0, -5.0)]

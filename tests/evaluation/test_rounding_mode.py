@@ -17,7 +17,7 @@ from fieldcal.evaluation.rounding_mode import (
     with_rounding_uncertainty,
     zero_crossings,
 )
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 from fieldcal.session.folder import Session
 
 STEP = 0.05

@@ -10,7 +10,7 @@ import pytest
 from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
 from fieldcal.evaluation.observations import build_observations
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 from fieldcal.solve import solve
 from fieldcal.windows import Average
 

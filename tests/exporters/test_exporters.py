@@ -20,12 +20,8 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.mavlink_installed import (
-    ARDUPILOT,
-    PX4,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, PX4, parameter_names
 from fieldcal.exporters import ExportSource, ardupilot, format_names, load_exporter, px4
 from fieldcal.exporters.kalibr import window_noise_density
 from fieldcal.session.folder import Session

@@ -17,6 +17,7 @@ from session_folders import places, recorded, write_session
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.commands import batch as command
+from fieldcal.commands import progress
 from fieldcal.core.errors import InputError
 from fieldcal.fleet.batch import SessionBatch
 from fieldcal.fleet.outcome import SessionTask
@@ -109,7 +110,7 @@ def test_a_log_file_says_how_far_a_batch_is(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(command, "NOTE_INTERVAL", 0.0)
+    monkeypatch.setattr(progress, "NOTE_INTERVAL", 0.0)
     monkeypatch.setattr("fieldcal.fleet.outcome.SessionTask", Quick)
     call = ["batch", str(tree), "--history", str(tmp_path / "h")]
     main([*call, "-o", str(tmp_path / "t.parquet")])

@@ -20,7 +20,8 @@ from fieldcal.cli import main
 from fieldcal.commands.history import trend_lines
 from fieldcal.commands.report import write_report
 from fieldcal.core.errors import InputError
-from fieldcal.evaluation.observations import observe, usable_windows, with_provenance
+from fieldcal.evaluation.observations import observe, with_provenance
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.history.location import default_location
 from fieldcal.history.store import History, family_runs
 from fieldcal.history.trend import parameter_trend
@@ -146,7 +147,7 @@ def bench(folder: Path, taken_at: str = "2026-06-01T10:00:00Z") -> Session:
     import pyarrow as pa
     import pyarrow.parquet
 
-    from fieldcal.session.sample_files import to_record_batch
+    from fieldcal.session.sample_table import to_record_batch
 
     folder.mkdir()
     windows = [(0.0, 0.0, 5.0, 15.0), (np.pi / 4, np.radians(5.0), 25.0, 35.0)]

@@ -25,12 +25,13 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import inspect, text, update
 
 from fieldcal.calibration import Calibration
+from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.history import database, filters, sessions
 from fieldcal.history.database import Database
 from fieldcal.history.location import StoreLocation
-from fieldcal.history.repeats import withdraw
+from fieldcal.history.repeats import replacing_folders, shorter_copies, withdraw
 from fieldcal.history.sessions import StoredSession
 from fieldcal.history.store import History, earlier_runs
 from fieldcal.history.tables import METADATA, SESSION
@@ -226,7 +227,55 @@ def test_of_sessions_with_the_same_samples_the_first_is_used() -> None:
     some = [stored(1, part=PART), other, stored(3, part=PART), stored(4), stored(5)]
     kept, left_out = sessions.without_repeats(some)
     assert [one.folder for one in kept] == ["/s/1", "/s/2", "/s/4", "/s/5"]
-    assert [one.folder for one in left_out] == ["/s/3"]
+    assert [(one.folder, other.folder) for one, other in left_out] == [("/s/3", "/s/1")]
+
+
+BEGUN = RecordedPart("5a", 0.0, 90.0, 9000, "run 7")
+CONTINUED = RecordedPart("c3", 0.0, 150.0, 15000, "run 7")
+
+
+@pytest.mark.parametrize("order", [(1, 2), (2, 1)])
+def test_of_a_run_and_its_copy_made_before_it_was_continued_the_longer_counts(
+    tmp_path: Path, order: tuple[int, int]
+) -> None:
+    place = tmp_path / "h"
+    both = {1: stored(1, part=BEGUN), 2: stored(2, part=CONTINUED)}
+    put(
+        place,
+        *(both[i] for i in order),
+        stored(3, part=replace(BEGUN, digest="b7", run="r8")),
+    )
+    assert {r.session for r in History(place).runs("A1")} == {"/s/2", "/s/3"}
+    data = Database(place)
+    assert data.run(shorter_copies) == [("/s/1", "/s/2")]
+    assert data.run(lambda db: shorter_copies(db, {"serial": "B1"})) == []
+    assert data.run(replacing_folders) == {}, "it would not count if solved again"
+    put(place, stored(4, serial="", part=replace(CONTINUED, samples=20000)))
+    assert {r.session for r in History(place).runs("A1")} == {"/s/2", "/s/3"}
+    data.run(lambda db: withdraw(db, ["/s/2", "/s/4"]), write=True)
+    assert {r.session for r in History(place).runs("A1")} == {"/s/1", "/s/3"}
+
+
+def test_of_a_run_and_its_copies_the_longer_is_used_in_its_place() -> None:
+    later = stored(4, part=replace(CONTINUED, start=90.0))
+    some = [stored(1, part=BEGUN), stored(2, part=CONTINUED), stored(3), later]
+    kept, left_out = sessions.without_repeats(some)
+    assert [one.folder for one in kept] == ["/s/2", "/s/3"]
+    assert [(one.folder, other.folder) for one, other in left_out] == [
+        ("/s/4", "/s/2"), ("/s/1", "/s/2"),
+    ]  # fmt: skip
+
+
+def test_the_screen_says_which_copy_does_not_count(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = tmp_path / "h"
+    put(place, stored(1, part=BEGUN), stored(2, part=CONTINUED))
+    said = "/s/1: is a copy of /s/2 with fewer samples, and does not count\n"
+    assert main(["history", "A1", "--history", str(place)]) == 0
+    assert capsys.readouterr().err == f"fieldcal history: {said}"
+    main(["lot", "serial=A1", "--history", str(place)])
+    assert f"fieldcal lot: {said}" in capsys.readouterr().err
 
 
 def test_a_copy_of_a_session_is_not_what_it_is_compared_with(tmp_path: Path) -> None:

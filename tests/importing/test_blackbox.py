@@ -11,7 +11,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.times.row_validator import RowValidator
 
 pytest.importorskip("orangebox", reason="the extra betaflight is not installed")

@@ -12,7 +12,7 @@ from laid_about import turned
 
 from fieldcal.core.samples import Array, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.session.merge import FilesInOrder
 
 ROWS = turned(4, 25.0, 1.0)

@@ -15,7 +15,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importers.csv_like import TextColumns
-from fieldcal.importing.recording import ReadOptions as Layout
+from fieldcal.importing.read_options import ReadOptions as Layout
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session.folder import Session
 

@@ -16,7 +16,8 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.headings.headings import match_headings
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import Recording
 from fieldcal.importing.words.heading_units import UNITS
 from fieldcal.importing.words.heading_words import heading_meaning
 

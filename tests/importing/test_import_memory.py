@@ -12,7 +12,8 @@ import pytest
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importing.files.spool import IN_MEMORY, SpooledRows
-from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.session.ingest import import_stream
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session.folder import Session

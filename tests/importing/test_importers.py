@@ -22,7 +22,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.drivers.mavlink_installed import InstalledCalibration
 from fieldcal.importers import formats, open_recording
 from fieldcal.importing import recording as recordings
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.session.ingest import import_stream
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session import sample_files

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.records.cut_json import (
     whole_beginning,
     without_last_commas,

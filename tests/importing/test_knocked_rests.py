@@ -11,7 +11,7 @@ import pytest
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 
 RATE, KNOCKS, PER_KELVIN = 20.0, (70.0, 150.0, 260.0, 330.0), 4e-3

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import ReadOptions, RowBatch
+from fieldcal.importing.read_options import ReadOptions, RowBatch
 from fieldcal.importing.tables.column_times import split_seconds
 from fieldcal.importing.times.row_times import (
     BETWEEN,

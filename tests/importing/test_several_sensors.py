@@ -11,7 +11,7 @@ from laid_about import G, turned, write
 
 from fieldcal.core.errors import InputError
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.words.heading_words import is_counter
 
 ROWS = turned(14, 50.0, 2.0)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.text.labels import labelled_values
 from fieldcal.importing.text.text_forms import forms_of
 from fieldcal.importing.times.clock_text import ClockText, is_clock

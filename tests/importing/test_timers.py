@@ -14,7 +14,7 @@ from laid_about import turned, write
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.times.row_times import RowTimes
 from fieldcal.session.folder import Session
 

@@ -11,9 +11,9 @@ from laid_about import G, turned
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.text.paired_cells import PairedCells
-from fieldcal.importing.units.unit_guess import settle_units
+from fieldcal.importing.units.settled_units import settle_units
 
 ROWS = turned(17, 50.0, 2.0)
 T, A, W = ROWS[:, 0], ROWS[:, 1:4], ROWS[:, 4:]

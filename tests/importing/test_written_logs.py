@@ -30,7 +30,7 @@ from written_logs import (
 
 from fieldcal.cli import main
 from fieldcal.importing.columns import to_signed_16_bit
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.text.cell_forms import HexCells, ListCells
 from fieldcal.importing.text.line_forms import EchoedMessages
 from fieldcal.importing.times.row_times import RowTimes

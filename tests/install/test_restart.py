@@ -18,11 +18,8 @@ from processes import HANGS, TWO_POSITION, simulated, steady
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.drivers.mavlink_installed import (
-    ARDUPILOT,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, parameter_names
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.drivers.mavlink_watch import STABLE_ROUNDS, InstalledWatch
 from fieldcal.session.installed_calibration import (

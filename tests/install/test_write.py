@@ -24,12 +24,8 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
 from fieldcal.commands.write import change_table, propose_changes
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import (
-    ARDUPILOT,
-    PX4,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, PX4, parameter_names
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.install.proposal import changes, problems
 from fieldcal.session.folder import Session

@@ -18,7 +18,7 @@ from thermal_devices import Warming, drawn, exact, session
 from fieldcal.calibration import limits
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, PX4
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.install.thermal import id_names, thermal_parameters
 from fieldcal.install.transaction import GYR_OFFSETS

@@ -20,7 +20,7 @@ from fieldcal.navigator.growth import error_dynamics, propagate_errors
 from fieldcal.navigator.large_angles import beyond_first_order
 from fieldcal.navigator.session_runs import calibrate_navigator
 from fieldcal.navigator.solution import read_solution, runs_in_windows
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 EXACT = Sensors(np.zeros(3), np.ones(3), np.zeros(3))
 
@@ -29,7 +29,7 @@ def solved(folder: Path, **how: Any) -> tuple[Calibration, Sensors]:
     rng = np.random.default_rng(how.pop("seed", 1))
     sensors = how.pop("sensors", None) or Sensors.drawn(rng)
     record(folder, sensors, rng, **how)
-    about = description.read_description(folder / "session.toml")
+    about = description_file.read_description(folder / "session.toml")
     return calibrate_navigator(folder, about), sensors
 
 
@@ -245,7 +245,7 @@ def test_what_cannot_be_used_is_refused(
     (tmp_path / file).write_text(content)
     with pytest.raises(InputError, match=says):
         calibrate_navigator(
-            tmp_path, description.read_description(tmp_path / "session.toml")
+            tmp_path, description_file.read_description(tmp_path / "session.toml")
         )
 
 
@@ -272,5 +272,5 @@ def test_one_level_velocity_does_not_turn_with_the_azimuth(tmp_path: Path) -> No
     record(tmp_path, EXACT, rng, faces=FACES[:1], columns=("vn",), azimuth_deg=9.0)
     with pytest.raises(InputError, match="has one of them"):
         calibrate_navigator(
-            tmp_path, description.read_description(tmp_path / "session.toml")
+            tmp_path, description_file.read_description(tmp_path / "session.toml")
         )

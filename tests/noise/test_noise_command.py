@@ -9,6 +9,7 @@ import math
 import os
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -177,10 +178,19 @@ def test_a_session_counts_once(told: Told, capsys: pytest.CaptureFixture[str]) -
     assert "is there twice: give each session once" in capsys.readouterr().err
 
 
+def test_a_copy_of_a_recording_is_refused(
+    told: Told, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copytree(told.folder, tmp_path / "copy")
+    assert main(["noise", str(told.folder), str(tmp_path / "copy")]) == 2
+    assert f"copy: has the samples of {told.folder}" in capsys.readouterr().err
+
+
 def test_sessions_of_two_devices_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    paths = [str(session(tmp_path / name, 60, serial=name)) for name in ("A1", "B2")]
+    seeds = {"A1": 20, "B2": 21}
+    paths = [str(session(tmp_path / n, 60, i, serial=n)) for n, i in seeds.items()]
     assert main(["noise", *paths]) == 2
     assert "is of device B2" in capsys.readouterr().err
 

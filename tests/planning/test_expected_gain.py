@@ -15,7 +15,7 @@ from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.search.inference import Inference
 from fieldcal.planning.expected_gain import ExpectedGain
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import checked_effect
@@ -49,7 +49,7 @@ def explained(
         alpha, beta = p.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
         tables.append({**angles, "start_s": w[2], "end_s": w[3]})
-    about = description.parse_description(
+    about = description_file.parse_description(
         {
             "site": {"latitude_deg": 45.0, "height_m": 0.0},
             "device": {"grade": "tactical", **left},

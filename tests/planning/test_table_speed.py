@@ -15,8 +15,9 @@ from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.errors import PlanError
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import observe, usable_windows
+from fieldcal.evaluation.observations import observe
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.planning.table_speed import NAMES, expected_by_speed, spin_axes
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve

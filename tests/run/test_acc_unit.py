@@ -15,7 +15,7 @@ from fieldcal.run.acc_unit import acc_unit_message
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.wait_reason import WaitState
 from fieldcal.run.waiting import PositionWait
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 G = 9.811
 TEXT = "serial:/dev/ttyACM0?format=text&columns=ax,ay,az"

@@ -14,7 +14,7 @@ from fieldcal.core.errors import (
 )
 from fieldcal.core.positions import TWO_POSITIONS, Position
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.planning.steps import hold
 from fieldcal.run.engine import Engine
 from fieldcal.run.operator.protocol import OperatorView

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from engine_bench import ABOUT, Bench, Turner, events, hold_all
 
-from fieldcal.core.errors import (
-    Stopped,
-)
+from fieldcal.core.errors import Stopped
 from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, add, hold
@@ -21,7 +19,7 @@ from fieldcal.run.interruptions import RepeatPosition
 from fieldcal.run.operator.protocol import Wish
 from fieldcal.run.wait_reason import WaitState
 from fieldcal.run.waiting import PositionWait
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import VirtualDevice
@@ -155,7 +153,9 @@ def test_nobody_insists_on_a_place_that_is_right_by_now(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a base that sways it moves there without a motion that would be noticed."""
-    about = description.parse_description({"site": {"gravity": 9.81, "sways": True}})
+    about = description_file.parse_description(
+        {"site": {"gravity": 9.81, "sways": True}}
+    )
     turner = Insistent(InProcess(VirtualDevice(seed=3)), slips=[(10.0, 0.0)])
     turner.corrects, turner.waits = False, []
 

@@ -10,7 +10,7 @@ from engine_bench import hold_all, make
 from fieldcal.core.errors import InputError
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.core.samples import Block
-from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.session.position_tables import position_table
 from fieldcal.session.recorder import Recorder

@@ -15,7 +15,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitState
 from fieldcal.run.waiting import PositionWait
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 
 def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
@@ -42,7 +42,7 @@ def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
             assert waiting.arrived, (wanted, waiting.problem)
 
 
-FIVE_ABOUT = description.parse_description(
+FIVE_ABOUT = description_file.parse_description(
     {
         "site": {"gravity": 9.81},
         "position": [

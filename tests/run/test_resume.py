@@ -22,7 +22,7 @@ from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
 from fieldcal.run.resuming import open_for_resume, positions_left_out, recorded_averages
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.folder import Session
 from fieldcal.session.marks import MARKS
 from fieldcal.session.recorder import SAMPLES, Recorder
@@ -253,7 +253,7 @@ def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
     recorded(tmp_path / "s")
     with pytest.raises(SessionError, match="--resume"):
         Recorder(tmp_path / "s", TABLES)
-    assert description.read_description(tmp_path / "s" / "session.toml").positions
+    assert description_file.read_description(tmp_path / "s" / "session.toml").positions
 
 
 @pytest.mark.thorough

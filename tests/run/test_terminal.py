@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from threading import Event
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from terminal_screens import HOLD, MISPLACED, SCREENS, screen, sized, view
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
+from fieldcal.run.operator import terminal
 from fieldcal.run.operator.banner import can_draw, draw_large
 from fieldcal.run.operator.protocol import Phase
+from fieldcal.run.operator.redrawing import Redrawing
 from fieldcal.run.operator.terminal import ConsoleOperator
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
@@ -77,6 +80,58 @@ def test_while_the_next_position_is_chosen_it_says_so(size: tuple[int, int]) -> 
     operator = sized(*size)
     operator.show(view("taken", 30.0, hold=operator._shown.hold))
     assert "what comes next is being worked out" in screen(operator)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (60, 20), (40, 15)])
+def test_it_says_for_how_long_the_next_position_is_being_worked_out(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    operator, now = sized(*size), [100.0]
+    operator._keyboard = None
+    monkeypatch.setattr(terminal, "monotonic", lambda: now[0])
+    with operator:
+        operator.show(view("taken", 30.0, hold=operator._shown.hold))
+        assert operator._redrawing.goes_on
+        operator._redrawing.stop()  # what it draws is looked at here
+        now[0] += 12.0
+        operator._draw_work()
+        said = " ".join(screen(operator, *size).split())
+        assert "being worked out, 12 s" in said
+        assert len(screen(operator, *size).splitlines()) <= size[1]
+        operator.tell("GO so far")
+        assert operator._redrawing.goes_on
+        operator.place(Hold(2, FIVE_POSITIONS[2], 30.0))
+        assert not operator._redrawing.goes_on
+        assert "worked out" not in screen(operator, *size)
+    assert not operator._redrawing.goes_on
+
+
+def test_a_log_of_lines_is_not_drawn_again() -> None:
+    out = io.StringIO()
+    operator = ConsoleOperator("s", FIVE_POSITIONS, ManualMover(), Console(file=out))
+    with operator:
+        operator.place(HOLD)
+        operator.show(view("taken", 30.0))
+        assert not operator._redrawing.goes_on
+
+
+def test_it_is_drawn_until_it_is_stopped() -> None:
+    drawn: list[int] = []
+    enough, waits = Event(), []
+
+    def wait(stopped: Event, seconds: float) -> bool:
+        waits.append(seconds)
+        if len(waits) <= 3:
+            return False
+        enough.set()
+        return stopped.wait()
+
+    redrawing = Redrawing(lambda: drawn.append(len(drawn)), wait)
+    redrawing.start()
+    assert enough.wait(60.0)
+    redrawing.stop()
+    redrawing.stop()
+    assert drawn == [0, 1, 2] and set(waits) == {1.0}
 
 
 def test_what_went_wrong_stays_until_the_position_is_taken(

@@ -10,7 +10,7 @@ from fieldcal.core.positions import Position
 from fieldcal.core.samples import Block
 from fieldcal.planning.steps import Hold
 from fieldcal.run.waiting import SETTLE_S, SWAY_SETTLE_S, PositionWait
-from fieldcal.session import description
+from fieldcal.session import description_file
 
 G, RATE, TURN_S = 9.81, 100.0, 3.0
 
@@ -27,7 +27,7 @@ def turning_to(alpha_deg: float, sways: bool) -> float:
     gyr[:, 2] = np.gradient(alpha, t)
     noise = rng.standard_normal((len(t), 6)) * np.repeat([5e-3, 1e-3], 3)
     block = Block.of(t, acc + noise[:, :3], gyr + noise[:, 3:])
-    about = description.parse_description(
+    about = description_file.parse_description(
         {
             "format": 1,
             "site": {"gravity": G, "sways": sways},
@@ -67,7 +67,7 @@ def test_a_gust_is_no_turn_and_calls_nobody_anew(
     acc += gust[:, None] * 0.5 * rng.standard_normal(acc.shape)
     gyr = 1e-3 * rng.standard_normal(acc.shape) * (1 + 50 * gust[:, None])
     block = Block.of(t, acc, gyr)
-    about = description.parse_description(
+    about = description_file.parse_description(
         {
             "format": 1,
             "site": {"gravity": G},
@@ -100,7 +100,7 @@ def test_nobody_waits_for_an_axis_that_is_missing(lacks: list[int], says: str) -
     acc = [-G, 0.0, 0.0] + 5e-3 * rng.standard_normal((len(t), 3))
     acc[:, lacks] = np.nan
     block = Block.of(t, acc, 1e-3 * rng.standard_normal(acc.shape))
-    about = description.parse_description(
+    about = description_file.parse_description(
         {
             "format": 1,
             "site": {"gravity": G},

@@ -35,7 +35,7 @@ from fieldcal.service.jobs import Job, JobStore, held_folder
 from fieldcal.service.own_process import run_in_own_process
 from fieldcal.service.queue import JobQueue
 from fieldcal.service.work import JobTask, without_paths
-from fieldcal.session.sample_files import to_record_batch
+from fieldcal.session.sample_table import to_record_batch
 from fieldcal.sim_device.profile import Profile
 
 T = TypeVar("T")

@@ -19,7 +19,7 @@ from recorded import block, faults, killed, moments, same
 from fieldcal.cli import main
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
-from fieldcal.session import sample_files
+from fieldcal.session import sample_files, sample_table
 from fieldcal.session.arrow_stream import decode_stream
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults
@@ -112,7 +112,7 @@ def test_changed_bytes_cost_their_batch_and_invent_nothing(
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(whole) - 1))
         whole[at] ^= data.draw(st.integers(1, 255))
-    found = decode_stream(bytes(whole), sample_files.samples_schema())
+    found = decode_stream(bytes(whole), sample_table.samples_schema())
     rows = [r for b in found.batches for r in b.column("seq").to_pylist()]
     assert set(rows) <= set(range(BATCHES * ROWS)) and len(set(rows)) == len(rows)
     for batch in found.batches:
@@ -129,7 +129,7 @@ def test_a_batch_whose_checksum_lost_its_name_is_damaged(
 ) -> None:
     whole = (session / "samples.arrows").read_bytes()
     found = decode_stream(
-        whole.replace(name, b"x" + name[1:], 1), sample_files.samples_schema()
+        whole.replace(name, b"x" + name[1:], 1), sample_table.samples_schema()
     )
     assert len(found.batches) == BATCHES - 1
     assert "is damaged and left out" in found.faults[0]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fieldcal.core.errors import SessionError
-from fieldcal.session.description import read_description
+from fieldcal.session.description_file import read_description
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core.positions import Position
-from fieldcal.session.description import parse_description, with_added_positions
+from fieldcal.session.description_file import parse_description, with_added_positions
 from fieldcal.session.position_tables import parse_positions, position_table
 from fieldcal.session.schemas import schema_fault, validator
 

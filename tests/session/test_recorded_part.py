@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 from session_folders import write_session
 
+from fieldcal.core.documents import load_toml
 from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.core.samples import Block
 from fieldcal.session import sample_files
+from fieldcal.session.folder import Session
 from fieldcal.session.recorded_part import recorded_part
+from fieldcal.session.recorder import Recorder
 
 RNG = np.random.default_rng(1)
 BLOCK = Block.of(np.arange(200) / 10, RNG.normal(size=(200, 3)),
@@ -75,6 +78,38 @@ def test_neither_format_nor_size_of_parts_matters(
         for t, six in zip(block.t.tolist(), block.six.tolist(), strict=True):
             out.writerow(["" if v != v else repr(v) for v in (t, *six)])
     assert part(tmp_path / "b") == first
+
+
+def test_a_run_that_was_continued_is_the_run_of_its_copy(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a", {"format": 1}) as recorder:
+        recorder.append(BLOCK[:120])
+    shutil.copytree(tmp_path / "a", tmp_path / "copy")
+    with Recorder(tmp_path / "a", None) as recorder:
+        recorder.append(BLOCK[120:])
+    continued, copy = part(tmp_path / "a"), part(tmp_path / "copy")
+    assert (continued.samples, copy.samples) == (200, 120)
+    assert continued.digest != copy.digest and continued.run == copy.run
+    assert continued.overlaps(copy)
+
+
+def test_each_run_has_an_id_of_its_own_whatever_its_plan_had(tmp_path: Path) -> None:
+    plan: dict[str, object] = {"format": 1}
+    for name in "ab":
+        with Recorder(tmp_path / name, plan) as recorder:
+            recorder.append(BLOCK if name == "a" else BLOCK[:120])
+        plan = load_toml((tmp_path / name / "session.toml").read_text())
+    first, second = (Session.open(tmp_path / name).about.recording_id for name in "ab")
+    assert first and second and first != second
+    assert not part(tmp_path / "a").overlaps(part(tmp_path / "b"))
+
+
+def test_a_session_toml_that_was_copied_makes_no_copy_of_other_samples(
+    tmp_path: Path,
+) -> None:
+    about = {"recording": {"id": "7f"}}
+    first = part(write_session(tmp_path / "a", BLOCK, [], **about))
+    other = part(write_session(tmp_path / "b", BLOCK[1:], [], **about))
+    assert first.run and not first.overlaps(other)
 
 
 def test_a_folder_without_samples_is_of_no_recording(tmp_path: Path) -> None:

@@ -18,8 +18,8 @@ from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions
-from fieldcal.session import description, sample_files
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.session import description_file, sample_files, sample_table
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
@@ -79,7 +79,7 @@ def test_a_name_that_is_not_utf_8_is_refused_with_the_remedy(tmp_path: Path) -> 
 
 def test_every_file_kind_gives_the_same_samples(tmp_path: Path) -> None:
     wanted = block()
-    table = pa.Table.from_batches([sample_files.to_record_batch(wanted)])
+    table = pa.Table.from_batches([sample_table.to_record_batch(wanted)])
     csv = tmp_path / "a.csv"
     pa.csv.write_csv(table, csv)
     (tmp_path / "b.csv.gz").write_bytes(gzip.compress(csv.read_bytes()))
@@ -277,7 +277,7 @@ names = st.sampled_from(["site", "frame", "nominal", "model", "position", "units
 @given(st.dictionaries(names, json_values | tables | st.lists(tables, max_size=3)))
 def test_any_table_is_read_or_refused_in_words(raw: dict[str, Any]) -> None:
     try:
-        about = description.parse_description(raw)
+        about = description_file.parse_description(raw)
     except InputError as error:
         assert str(error)
     else:

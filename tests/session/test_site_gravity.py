@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fieldcal.core.gravity import normal_gravity
-from fieldcal.session.description import Description, parse_description
+from fieldcal.session.description import Description
+from fieldcal.session.description_file import parse_description
 from fieldcal.session.site_gravity import gravity_sigma
 
 

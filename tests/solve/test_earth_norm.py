@@ -13,8 +13,9 @@ from session_folders import write_session
 from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import observe, usable_windows
+from fieldcal.evaluation.observations import observe
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 

@@ -21,8 +21,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.gravity import normal_gravity
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 

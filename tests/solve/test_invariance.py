@@ -16,7 +16,7 @@ from fieldcal.cli import main
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis import Diagnosis, diagnose
 from fieldcal.session.description import Description
-from fieldcal.session.description import parse_description as description
+from fieldcal.session.description_file import parse_description as description
 from fieldcal.sim_device.profile import NoiseFigures, Profile, Sampling
 from fieldcal.sim_device.vocabulary import parse
 

@@ -14,8 +14,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.frames import direction_cosines
 from fieldcal.core.samples import Block
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 

@@ -15,8 +15,9 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import observe, usable_windows
+from fieldcal.evaluation.observations import observe
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse

@@ -27,9 +27,9 @@ from fieldcal.core.gravity import normal_gravity
 from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_session as solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.model.turns import rotation
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.session.folder import Session

@@ -15,7 +15,8 @@ from fieldcal.acceptance.assessment import assess, store_in_history
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.family_at_temperature import family_at_temperature
 from fieldcal.calibration import Calibration, limits
-from fieldcal.evaluation.observations import observe, usable_windows, with_provenance
+from fieldcal.evaluation.observations import observe, with_provenance
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.history.store import History, HistoryRun
 from fieldcal.history.trend import parameter_trend
 from fieldcal.session.folder import Session

@@ -14,6 +14,7 @@ from thermal_devices import Warming, drawn, exact, session
 from fieldcal.acceptance.temperature import effect_of_temperature_change
 from fieldcal.calibration import Calibration, limits
 from fieldcal.cli import main
+from fieldcal.core.samples import Block
 from fieldcal.evaluation.observations import observe
 from fieldcal.history.store import HistoryRun
 from fieldcal.session.folder import RESULT, Session
@@ -105,6 +106,24 @@ def test_a_session_counts_once(
     assert main(["temperature", *map(str, paths)]) == 2
     said = capsys.readouterr().err
     assert f"{paths[0]} and {paths[3]} are the same calibration" in said
+
+
+def test_a_run_and_its_copy_made_before_it_was_continued_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Their calibrations differ, and are no two of the device."""
+    of, rng = drawn(np.random.default_rng(1)), np.random.default_rng(2)
+    block = Block.of(np.arange(90) / 10, *rng.normal(size=(2, 90, 3)))
+    paths = []
+    for i, (t, count) in enumerate([(5, 60), (20, 90), (40, 90)]):
+        samples = block[:count] if i < 2 else replace(block, t=block.t + 1e3)
+        about = {"recording": {"id": "7f"}}
+        paths.append(write_session(tmp_path / str(i), samples, [], **about))
+        result = json.dumps(at(of, t).to_json())
+        (paths[-1] / "result.json").write_text(result)
+    assert main(["temperature", *map(str, paths)]) == 2
+    said = capsys.readouterr().err
+    assert f"{paths[1]}: has samples of {paths[0]}: give each recording once" in said
 
 
 def test_sessions_of_two_devices_are_refused(

@@ -9,12 +9,8 @@ import pytest
 from calibrations import calibration
 
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import (
-    ARDUPILOT,
-    PX4,
-    InstalledCalibration,
-    parameter_names,
-)
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
+from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, PX4, parameter_names
 from fieldcal.thermal import thermal_point
 
 WARM = {"conditions": {"temperature_degc": 21.5, "temperature_sd_k": 0.2}}

@@ -47,6 +47,15 @@ def test_two_devices_are_found_with_their_difference(how: str, what: str) -> Non
     assert np.allclose(found.noise, NOISE, rtol=0.3)
 
 
+def test_outputs_that_do_not_differ_blur_nothing() -> None:
+    """Two of six tell them apart, far beyond their noise, and by chance others lean."""
+    apart = NOISE * [3000.0, 1.5, 3000.0, 0.2, 0.2, 0.2]
+    for seed in range(40):
+        found = alternating_means(one_device(seed) + turns("in turn")[:, None] * apart)
+        assert found is not None, seed
+        assert np.allclose(found.noise, NOISE, rtol=0.3), seed
+
+
 def test_rates_may_differ() -> None:
     apart = NOISE * OTHERS["one bias and its neighbour"]
     mixed = one_device(2) + turns("one four times as quick")[:, None] * apart

@@ -33,6 +33,7 @@ from fieldcal.against.motion.grid import (
     overlap,
 )
 from fieldcal.core.errors import InputError
+from fieldcal.core.rotation import nearest_rotation
 from fieldcal.core.samples import ACC, Array, Block, Index
 from fieldcal.model.rows.motion import Alignment
 
@@ -196,10 +197,7 @@ def _rotation(one: EvenGrid, two: EvenGrid, x: Array, z: Array) -> Array:
         if triad is ACC and moving.shape[1] == 3:  # where the force points
             mean = np.outer(one.mean[ACC], two.mean[ACC])
             b += len(x) * weight[:, None] * mean
-    left, _, right = np.linalg.svd(b)
-    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    out: Array = left @ sign @ right  # (1)
-    return out
+    return nearest_rotation(b)  # (1)
 
 
 def _unseen_gravity(one: EvenGrid, two: EvenGrid, rotation: Array) -> Array:

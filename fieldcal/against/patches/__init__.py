@@ -16,7 +16,7 @@ from typing import Protocol, cast
 
 from fieldcal.against.sensor_model import SensorModel, effect_with_values
 from fieldcal.core.plugins import module_names
-from fieldcal.session.folder import write_atomically
+from fieldcal.session.file_writing import write_atomically
 
 
 class PatchFormat(Protocol):

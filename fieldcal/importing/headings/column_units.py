@@ -8,7 +8,7 @@ from dataclasses import replace
 from shlex import quote
 
 from fieldcal.importing.headings.heading import Column
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.words.heading_units import TEMPERATURES, UNITS, parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 

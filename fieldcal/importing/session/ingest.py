@@ -10,14 +10,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import time
-from typing import Any
+from typing import Any, NamedTuple
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
 from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.importing.recording import Recording
-from fieldcal.importing.session.found_rests import find_rests
+from fieldcal.importing.session.found_rests import RestSearch, find_rests
 from fieldcal.importing.session.held_values import HeldValues
 from fieldcal.importing.session.sample_writer import SampleWriter, file_record
 from fieldcal.importing.session.stream_facts import StreamFacts
@@ -133,6 +133,23 @@ def _flush_to_disk(*paths: Path) -> None:
             os.close(there)
 
 
+class _WrittenRows(NamedTuple):
+    """What was seen of the rows while they were written.
+
+    Attributes
+    ----------
+    facts, held, clock, judge : what each gathered
+    rests : where the device was still
+
+    """
+
+    facts: StreamFacts
+    held: HeldValues
+    clock: ClockStepRemover
+    judge: RowValidator
+    rests: RestSearch
+
+
 def _write_session(
     part: Path,
     recording: Recording,
@@ -140,31 +157,11 @@ def _write_session(
     about: Mapping[str, Any],
     still: float,
 ) -> ImportedSession:
+    """Write samples, session.toml and marks into the folder `part`."""
     import tomlkit
 
-    judge = RowValidator(str(recording.path), recording.place, recording.repair)
-    held = HeldValues()
-    facts, cells, clock, jumps = (
-        StreamFacts(),
-        CellAccumulator(),
-        ClockStepRemover(),
-        JumpFinder(),
-    )
-    with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
-        blocks = _without_clock_steps(clock, recording.blocks(stream))
-        for good in judge.through(blocks):
-            if len(good):
-                facts.add(good)
-                held.add(good)
-                cells.add(without_spikes(good))
-                if recording.wanted.rate_hz:
-                    jumps.add(good)
-                rows.add(cell_rows(cells.take_complete()))
-                written.add(good)
-        _refuse_useless(recording, facts, means="position" in about)
-        facts.left_out = judge.left_out
-        written.close()
-        found = find_rests(jumps, rows, cells.table, written.between, still)
+    seen = _write_samples(part, recording, stream, still, "position" in about)
+    facts, judge, clock, found = seen.facts, seen.judge, seen.clock, seen.rests
     # an empty list would be in the way of the tables that the user adds
     given = not found.rests or "position" in about
     tables = {} if given else {"position": found.positions}
@@ -172,7 +169,7 @@ def _write_session(
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
     recording.says += judge.says
     if "position" not in about:
-        recording.says += held.says(facts.rate_hz)
+        recording.says += seen.held.says(facts.rate_hz)
     recording.says += [said for said in (found.how, found.left_out) if said]
     recording.says += [step.sentence() for step in clock.steps]
     repairs = [*recording.mended, *judge.mended]
@@ -184,6 +181,31 @@ def _write_session(
     return ImportedSession(
         part, facts, rests, [*repairs, *recording.says, *none], forces
     )
+
+
+def _write_samples(
+    part: Path, recording: Recording, stream: str, still: float, means: bool
+) -> _WrittenRows:
+    """Write the samples of a stream, or `means`, and find where the device rests."""
+    judge = RowValidator(str(recording.path), recording.place, recording.repair)
+    facts, held, clock = StreamFacts(), HeldValues(), ClockStepRemover()
+    cells, jumps = CellAccumulator(), JumpFinder()
+    with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
+        blocks = _without_clock_steps(clock, recording.blocks(stream))
+        for good in judge.through(blocks):
+            if len(good):
+                facts.add(good)
+                held.add(good)
+                cells.add(without_spikes(good))
+                if recording.wanted.rate_hz:
+                    jumps.add(good)
+                rows.add(cell_rows(cells.take_complete()))
+                written.add(good)
+        _refuse_useless(recording, facts, means)
+        facts.left_out = judge.left_out
+        written.close()
+        rests = find_rests(jumps, rows, cells.table, written.between, still)
+    return _WrittenRows(facts, held, clock, judge, rests)
 
 
 def _refuse_useless(recording: Recording, facts: StreamFacts, means: bool) -> None:

@@ -21,7 +21,7 @@ class SampleWriter:
     def __init__(self, path: Path) -> None:
         import pyarrow.parquet
 
-        from fieldcal.session.sample_files import samples_schema
+        from fieldcal.session.sample_table import samples_schema
 
         self._path = path
         # no two samples are alike: a dictionary of them only takes time
@@ -49,7 +49,7 @@ class SampleWriter:
 
     def _put(self) -> None:
         """Write the rows that wait, in groups."""
-        from fieldcal.session.sample_files import to_record_batch
+        from fieldcal.session.sample_table import to_record_batch
 
         one = len(self._waiting) == 1
         whole = self._waiting[0] if one else concat(self._waiting)
@@ -77,7 +77,7 @@ class SampleWriter:
         """One group of rows; stretches that follow each other are in one."""
         import pyarrow.parquet
 
-        from fieldcal.session.sample_files import block_from_table
+        from fieldcal.session.sample_table import block_from_table
 
         if self._file is None:
             self._file = pyarrow.parquet.ParquetFile(self._path, pre_buffer=False)

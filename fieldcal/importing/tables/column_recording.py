@@ -25,16 +25,13 @@ from fieldcal.importing.headings.heading import (
     HeadingMatch,
     with_signs,
 )
-from fieldcal.importing.recording import (
-    ImuStream,
-    MeanScatter,
-    ReadOptions,
-    Recording,
-)
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import ImuStream, MeanScatter, Recording
 from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.axis_triples import unnamed_axes
 from fieldcal.importing.tables.column_choices import ask_of_choices, columns_option
-from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, column_numbers
+from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate
+from fieldcal.importing.tables.column_source import column_numbers
 from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
@@ -68,6 +65,10 @@ class ColumnRecording(Recording):
     @abstractmethod
     def ask(self) -> str:
         """What to do where nothing tells its columns."""
+
+    @abstractmethod
+    def read_samples(self) -> Iterator[Block]:
+        """Samples of the one IMU in it, row by row as they stand."""
 
     def rate_said(self) -> tuple[float, str] | None:
         """Sampling rate, Hz, that the file says of itself, and where; or None."""
@@ -112,10 +113,13 @@ class ColumnRecording(Recording):
             return dict.fromkeys(self.imus_found, self.wanted)
         return self.imus_found
 
-    def paired(self, blocks: Iterator[Block]) -> Iterator[Block]:
-        """Samples of its rows, also where each holds one of two sensors alone."""
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """Samples of an IMU, also where each row holds one of two sensors alone."""
+        if len(self.imus()) > 1:
+            yield from self.alone(stream).blocks(stream)
+            return
         rows = RowsInTurn(str(self.path), self.repair)
-        for block in rows.through(blocks):
+        for block in rows.through(self.read_samples()):
             self.in_turn = rows.told
             yield block
         self.says += [s for s in rows.says if s not in self.says]

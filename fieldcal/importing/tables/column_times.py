@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing.columns import SKIP
-from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
+from fieldcal.importing.read_options import TIME_UNITS, ReadOptions, RowBatch
 from fieldcal.importing.times.row_times import CLOCK_PARTS, FRACTIONS, NEAR_STEPS
 from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit

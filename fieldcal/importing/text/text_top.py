@@ -16,7 +16,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.headings.heading import Column, Heading
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.text.text_lines import split_quoted
 from fieldcal.importing.words.heading_units import parse_unit
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions, RowBatch
+from fieldcal.importing.read_options import CLOCK_NUMBER, ReadOptions, RowBatch
 
 FRACTIONS = {"t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9}
 """Columns that hold what is beyond the whole seconds of ``t``, and s in one of each."""

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import TIME_UNITS, Recording
+from fieldcal.importing.read_options import TIME_UNITS
+from fieldcal.importing.recording import Recording
 from fieldcal.importing.units.time_units import assumed_time_unit
 
 FIRST_ROWS = 1 << 17

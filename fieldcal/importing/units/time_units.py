@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import IMPOSSIBLE_RATE_HZ, Array
-from fieldcal.importing.recording import TIME_UNITS
+from fieldcal.importing.read_options import TIME_UNITS
 from fieldcal.importing.units.scales import MIN_ROWS, MIN_ROWS_ALONE
 from fieldcal.importing.units.slow_times import turns_at_once
 

@@ -9,7 +9,8 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import Recording
 from fieldcal.importing.units.gravity_size import GravityReading, estimate_gravity
 from fieldcal.importing.units.rate_size import compare_turns, estimate_rate_unit
 from fieldcal.importing.units.scales import ACC_SCALES, GYR_SCALES, Scale, rounded_text

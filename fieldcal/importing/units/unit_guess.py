@@ -1,23 +1,20 @@
 """Units that are assumed where neither the file nor the user states them, and why.
 
-What physics tells is taken, said, and kept as a guess until the user confirms it; where
-it leaves a choice, the user is asked, with what to add to the command.
+What physics tells is taken and said; where it leaves a choice, the user is asked, with
+what to add to the command.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.recording import MAX_READING, ReadOptions, Recording
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.units.calm_rates import HALVED, guess_unit_of_calm_rates
-from fieldcal.importing.units.file_times import FIRST_ROWS, settle_time_units
 from fieldcal.importing.units.gravity_size import (
     GravityReading,
     are_means,
@@ -60,8 +57,6 @@ from fieldcal.importing.units.unit_answers import (
 from fieldcal.importing.units.unit_doubts import (
     LOG_GRAVITY,
     StatedUnits,
-    check_format_units,
-    check_one_unit,
 )
 from fieldcal.importing.words.heading_units import HALF_ANGLE
 from fieldcal.session.units import UNSCALED
@@ -77,84 +72,7 @@ PLAIN_UNITS = ["--acc-unit m/s^2", "--acc-unit g"]
 """What accelerations are in, where their lengths tell nothing."""
 
 
-class AssumedUnits(NamedTuple):
-    """Assumptions about units that nobody stated.
-
-    Attributes
-    ----------
-    guessed : a sentence each, by quantity
-    acc_bias : x y z of [nominal], m/s^2; None where zero lies at zero
-
-    """
-
-    guessed: dict[str, str]
-    acc_bias: list[float] | None = None
-
-
-def settle_units(recording: Recording, stream: str) -> AssumedUnits:
-    """Determine the units of a recording from its numbers.
-
-    Raises
-    ------
-    InputError
-        With a question and its answers, where several or none would do.
-
-    """
-    parts = recording.parts
-    times = settle_time_units(parts) if len(parts) > 1 else []
-    heard = recording.alone(stream)
-    block = _beginning(heard, stream)
-    if not all(part.asks_units for part in parts):
-        check_format_units(recording, block)
-        return AssumedUnits(heard.guessed)
-    alone = len(parts) == 1
-    said, columns = _stated_units(parts), _columns_of_rates(parts)
-    guess = _Guess(str(recording.path), said, block, columns, alone)
-    if guess.said.acc_unit not in UNSCALED and guess.acc_bias is None:
-        check_one_unit(parts)
-    for part in parts:
-        part.wanted = guess.on(part.wanted)
-    parts[0].says += guess.doubts
-    taken = {k: why for one in (*parts, heard) for k, why in one.guessed.items()}
-    taken |= {"time": times[0]} if times else {}
-    return AssumedUnits(taken | guess.found, guess.acc_bias)
-
-
-def _beginning(recording: Recording, stream: str) -> Block:
-    whole = recording.first_rows(stream, FIRST_ROWS)
-    # such values tell no unit; whoever takes the rows says where they stand
-    acc, gyr = (np.where(np.abs(three) > MAX_READING, np.nan, three)
-                for three in (whole.acc, whole.gyr))  # fmt: skip
-    return replace(whole, acc=acc, gyr=gyr)
-
-
-def _stated_units(parts: Sequence[Recording]) -> ReadOptions:
-    """What is said of any part: each channel stands in one of them."""
-    said = parts[0].wanted
-    for part in parts[1:]:
-        w = part.wanted
-        said = replace(
-            said,
-            acc_unit=said.acc_unit or w.acc_unit,
-            gyr_unit=said.gyr_unit or w.gyr_unit,
-            time_unit=said.time_unit or w.time_unit,
-            named=said.named | w.named,
-        )
-    return said
-
-
-def _columns_of_rates(parts: Sequence[Recording]) -> NamedColumns:
-    """Columns in which the rates stand, of the file that has them."""
-    channels = [[c.partition("=")[0] for c in part.wanted.columns] for part in parts]
-    pairs = zip(parts, channels, strict=True)
-    part = next((part for part, known in pairs if "gx" in known), parts[0])
-    wanted = part.wanted
-    return NamedColumns(
-        str(part.path), wanted.columns, wanted.reversed, part.columns_said
-    )
-
-
-class _Guess:
+class UnitGuess:
     """Units of the beginning of a recording.
 
     Parameters
@@ -167,7 +85,7 @@ class _Guess:
     ----------
     found : what was guessed, by quantity
     said : what is said, with what was found
-    acc_bias : as in `AssumedUnits`
+    acc_bias : x y z of [nominal], m/s^2; None where zero lies at zero
     doubts : what the user says and physics does not, a sentence each
 
     """

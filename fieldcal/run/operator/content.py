@@ -32,6 +32,7 @@ class RunContent:
         device has no accelerometers
     view : present state of the engine
     hold : the position asked for
+    worked : for how long what comes next is being worked out, s
 
     """
 
@@ -42,6 +43,7 @@ class RunContent:
         self.taken: dict[int, float] = {}
         self.view: OperatorView | None = None
         self.hold: Hold | None = None
+        self.worked = 0.0
         self._told: list[str] = []
         self._told_before: list[str] = []
         self._reminder = ""
@@ -77,7 +79,13 @@ class RunContent:
             self._told = []
         if not alert(view):
             self._reminder = ""
-        self.view = view
+        self.view, self.worked = view, 0.0
+
+    @property
+    def is_worked_out(self) -> bool:
+        """Whether a position is taken and what comes next is not known yet."""
+        view = self.view
+        return view is not None and view.hold is self.hold and view.phase == "taken"
 
     @property
     def left_out(self) -> frozenset[int]:
@@ -98,7 +106,7 @@ class RunContent:
     def instruction(self) -> Instruction:
         """The present instruction."""
         number = position_label(self.hold, len(self.positions), self.most)
-        return Instruction.of(self.hold, self.view, number)
+        return Instruction.of(self.hold, self.view, number, self.worked)
 
     @property
     def sentences(self) -> list[str]:

@@ -11,6 +11,9 @@ from fieldcal.run.operator.widgets import alert
 
 TURN = "TURN TO"
 
+SHOWN_AFTER_S = 2.0
+"""Time after which it is said for how long something is being worked out, s."""
+
 Colour = Literal["", "cyan", "yellow", "green", "red"]
 
 
@@ -41,11 +44,17 @@ class Instruction:
 
     @classmethod
     def of(
-        cls, hold: Hold | None, view: OperatorView | None, number: str
+        cls, hold: Hold | None, view: OperatorView | None, number: str, worked: float
     ) -> Instruction:
-        """Instruction at a step by the latest view; `number` is the position's label.
+        """Instruction at a step by the latest view.
 
-        A view of an earlier step is ignored.
+        Parameters
+        ----------
+        hold : the step
+        view : the latest view; one of an earlier step is ignored
+        number : label of the position
+        worked : for how long the next step is being worked out, s
+
         """
         if hold is None:
             return cls("WAIT", "for the device", "")
@@ -64,4 +73,5 @@ class Instruction:
         if view.phase == "averaging":
             return cls("HOLD STILL", f"{number}: do not touch the device", "green")
         said = f"{number}: what comes next is being worked out"
-        return cls("TAKEN", said, "green")
+        since = f", {worked:.0f} s" if worked >= SHOWN_AFTER_S else ""
+        return cls("TAKEN", f"{said}{since}", "green")

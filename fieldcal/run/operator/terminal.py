@@ -2,7 +2,8 @@
 
 Nothing here blocks: the engine calls `show` for every block, and the screen is drawn at
 most `FRAMES_PER_S` times a second from the latest view. It goes on by itself; keys only
-confirm, repeat, skip or stop.
+confirm, repeat, skip or stop. While the run works out what comes next, the engine calls
+nothing, and the screen says for how long.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from fieldcal.run.operator import widgets
 from fieldcal.run.operator.content import RunContent
 from fieldcal.run.operator.keyboard import Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Wish
+from fieldcal.run.operator.redrawing import Redrawing
 from fieldcal.run.operator.screen import Screen
 from fieldcal.run.operator.turning import WishesWhileTurning
 from fieldcal.run.operator.widgets import alert
@@ -69,6 +71,7 @@ class ConsoleOperator:
         self._drawn = 0.0
         self._lines: set[str] = set()
         self._live: Live | None = None
+        self._redrawing, self._taken_at = Redrawing(self._draw_work), 0.0
         screen = self._console.is_terminal and not self._console.is_dumb_terminal
         if screen and not plain:
             # a screen of its own: what is resized leaves nothing of the last one behind
@@ -83,6 +86,7 @@ class ConsoleOperator:
         return self
 
     def __exit__(self, *exc: object) -> None:
+        self._redrawing.stop()
         if self._live:
             self._draw()
             self._live.stop()
@@ -91,6 +95,7 @@ class ConsoleOperator:
 
     def place(self, hold: Hold) -> None:
         """Ask for a position."""
+        self._redrawing.stop()
         before = self._shown.hold
         if before is None or before.index != hold.index:
             self._skips = -CONFIRM_WITHIN_S  # it was asked about the one before
@@ -108,11 +113,14 @@ class ConsoleOperator:
 
     def tell(self, text: str) -> None:
         """Keep a sentence on the screen."""
+        self._redrawing.stop()
         self._shown.sentence_told(text)
         self._ring(text)
+        self._redraw_while_working()
 
     def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
         """Ring for the reason shown on the screen."""
+        self._redrawing.stop()
         self._shown.alarm_repeated(waited)
         self._ring(reminder(waited) + reason.text)
 
@@ -150,6 +158,7 @@ class ConsoleOperator:
 
     def show(self, view: OperatorView) -> None:
         """Draw the view, unless the last drawing is too recent."""
+        self._redrawing.stop()
         self._shown.view_changed(view)
         if view.phase == "taken":
             self._bell()
@@ -157,6 +166,18 @@ class ConsoleOperator:
             self._log_view(view)
         elif monotonic() - self._drawn >= 1 / FRAMES_PER_S or view.phase == "taken":
             self._draw()
+        self._taken_at = monotonic()
+        self._redraw_while_working()
+
+    def _redraw_while_working(self) -> None:
+        """Go on drawing while the run works out what comes next."""
+        if self._live and self._live.is_started and self._shown.is_worked_out:
+            self._redrawing.start()
+
+    def _draw_work(self) -> None:
+        """Draw for how long the run is at it."""
+        self._shown.worked = monotonic() - self._taken_at
+        self._draw()
 
     def _bell(self) -> None:
         if self._live:

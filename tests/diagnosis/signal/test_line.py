@@ -18,7 +18,7 @@ from fieldcal.effects.sway import Sway
 from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 RATE, SIGMA, HZ, SIZE = 100.0, 5e-3, 7.03, 6e-4
 SEEDS = range(12)

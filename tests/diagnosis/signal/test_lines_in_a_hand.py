@@ -10,7 +10,7 @@ from fieldcal.diagnosis.signal.line import SpectralLine
 from fieldcal.diagnosis.signal.spectrum import find_lines
 from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 RATE, HELD_S, REST_S, COUNT = 100.0, 6.0, 9.0, 20
 NOISE = np.repeat([3e-2, 1e-3], 3)

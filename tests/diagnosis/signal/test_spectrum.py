@@ -9,7 +9,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.signal.spectrum import find_lines
 from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 RATE, N = 100.0, 400_000
 """More than an hour, in one window."""

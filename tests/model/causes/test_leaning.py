@@ -17,7 +17,7 @@ from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.leaning import leaning
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.lean_modes import lean_modes
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 SIDES = [*np.vstack([np.eye(3), -np.eye(3)]), *np.array(
     [[1, 1, 0], [0, -1, 1], [-1, 0, -1], [1, -1, 1], [-1, 1, 1], [1, 1, -1]]

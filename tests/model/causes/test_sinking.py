@@ -16,11 +16,11 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.wording.paragraph import notes
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.sinking import NAME, sinking
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 from fieldcal.session.folder import Session
 
 ANGLES = [(0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (180.0, 0.0), (-90.0, 0.0),

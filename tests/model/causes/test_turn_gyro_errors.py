@@ -16,12 +16,12 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.wording.paragraph import notes
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.turn_gyro_errors import turn_gyro_errors
 from fieldcal.physics.experience_rows import select_rows
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile, Sampling, Truth
 

@@ -18,12 +18,12 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.prepared_session import PreparedSession
 from fieldcal.evaluation.solution import solve_session
+from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.model.rows import base_sway
 from fieldcal.model.rows.base_sway import find_base_sway
-from fieldcal.session import description
+from fieldcal.session import description_file
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import profile as device
@@ -179,7 +179,7 @@ def test_between_windows_a_device_that_only_sways_turns_by_nothing() -> None:
     six[:, 2] -= G0 * np.sin(turned)
     six[:, 3] += rates
     block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
-    about = description.parse_description(
+    about = description_file.parse_description(
         {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
                       for a, b in held]}
     )  # fmt: skip
@@ -201,7 +201,7 @@ def test_two_stretches_of_a_window_are_as_uncertain_as_their_mean() -> None:
     six[:, 2] -= G0 * np.sin(turned)
     six[:, 3] += np.gradient(turned, t)
     held = [(2.0, 32.0), (40.0, 70.0), (78.0, 158.0), (168.0, 198.0)]
-    about = description.parse_description(
+    about = description_file.parse_description(
         {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
                       for a, b in held]}
     )  # fmt: skip
@@ -232,7 +232,7 @@ def test_what_a_window_is_too_short_to_show_is_what_waves_leave_in_its_mean() ->
     six[:, 3] += np.gradient(turned, t)
     six *= unit
     held = [(2.0, 32.0), (40.0, 70.0), (78.0, 85.5)]
-    about = description.parse_description(
+    about = description_file.parse_description(
         {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
                       for a, b in held],
          "nominal": {"acc_scale": unit[:3].tolist(), "gyr_scale": unit[3:].tolist()}}
@@ -263,7 +263,7 @@ def test_sway_is_the_same_in_any_unit_and_of_axes_that_are_mirrored(
     six[:, 2] -= G0 * np.sin(turned)
     six[:, 3] += np.gradient(turned, t)
     held = [(2.0, 32.0), (40.0, 70.0)]
-    about = description.parse_description(
+    about = description_file.parse_description(
         {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
                       for a, b in held]}
     )  # fmt: skip
@@ -337,10 +337,10 @@ def test_a_device_in_a_hand_is_on_no_base(tmp_path: Path) -> None:
 
 
 def test_who_says_that_it_sways() -> None:
-    assert description.parse_description(
+    assert description_file.parse_description(
         {"site": {"sways": True}, "format": 1}
     ).base_sways
-    assert not description.parse_description({"format": 1}).base_sways
+    assert not description_file.parse_description({"format": 1}).base_sways
 
 
 @pytest.mark.thorough

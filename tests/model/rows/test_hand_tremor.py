@@ -15,7 +15,7 @@ from fieldcal.model.rows.hand_tremor import force_wander_angle, turned_force
 from fieldcal.model.rows.hand_tremor import rows_of_recording as rows_in_a_hand
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 EVERY = tuple(range(len(LADDER)))
 G = 9.81

@@ -11,7 +11,8 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.rest_onset import rest_instants, window_starts
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import Description, parse_description
+from fieldcal.session.description import Description
+from fieldcal.session.description_file import parse_description
 
 RATE = 100.0
 NOISE = np.repeat([1e-2, 1e-3], 3)

@@ -12,7 +12,7 @@ from fieldcal.core.samples import Block
 from fieldcal.model.rows.means import median_sigma, rows_of_means
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 G = 9.8
 MEANS = np.array([

@@ -26,7 +26,7 @@ from fieldcal.model.turns.attitude import (
 from fieldcal.model.turns.integration import Leg, divide_into_steps, integrate_turn
 from fieldcal.model.turns.rotation import mean_rates, products
 from fieldcal.physics.experience import Experience
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 MOUNTING = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
 ALPHA, BETA = np.deg2rad([20.0, 70.0]), np.deg2rad([5.0, -30.0])

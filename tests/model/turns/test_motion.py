@@ -13,7 +13,7 @@ from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns.motion import motion_bounds
 from fieldcal.model.turns.turn_tracker import TurnTracker
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 RATE, NOISE = 100.0, 1e-4
 GAP = (1000, 4000)

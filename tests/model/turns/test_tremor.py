@@ -9,7 +9,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns.tremor import MIN_SAMPLES, sway_at_ends, sway_variance
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 STEP, SECONDS = 0.01, 10.0
 

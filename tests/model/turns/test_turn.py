@@ -25,7 +25,7 @@ from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_force_rows import TurnForceRows
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
     ONE,

@@ -11,7 +11,7 @@ from fieldcal.diagnosis.explain import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.turns.attitude import accelerations
 from fieldcal.model.turns.rotation import small_turns
-from fieldcal.session.description import parse_description
+from fieldcal.session.description_file import parse_description
 
 DEVICE = {"noise": {"acc": [0.01] * 3, "gyr": [1e-3] * 3}}
 

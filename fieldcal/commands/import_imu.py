@@ -1,0 +1,140 @@
+"""One IMU of a recording: it becomes a session, and the user reads what was taken."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldcal.commands.site import site_tables
+from fieldcal.core.gravity import G0
+
+if TYPE_CHECKING:
+    from fieldcal.core.samples import Array
+    from fieldcal.importing.recording import ImuStream, MeanScatter, Recording
+    from fieldcal.importing.session.ingest import ImportedSession
+
+
+def import_imu(
+    args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
+) -> ImportedSession:
+    """Make a session of one IMU, and say what was taken and what is left to say.
+
+    Raises
+    ------
+    InputError
+        If the recording leaves a question, with its answers.
+
+    """
+    from fieldcal.commands.progress import show_work
+    from fieldcal.importing.session.ingest import import_stream
+    from fieldcal.importing.units.settled_units import settle_units
+
+    about = _stated_tables(args, recording)
+    reading = f"reading {recording.path}"
+    with show_work(args, reading):
+        guessed, bias = settle_units(recording, stream.name)
+    if bias:
+        about["nominal"] = {"acc_bias": bias}
+    if guessed:
+        about["guessed"] = guessed
+        stream = next(s for s in recording.streams() if s.name == stream.name)
+    if (scatter := recording.scatter()) is not None:
+        return _import_means(args, recording, stream, folder, about, scatter)
+    with show_work(args, reading):
+        imported = import_stream(recording, stream.name, folder, about, args.still)
+    sys.stderr.write(
+        f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"
+        f" {_counted(len(imported.rests), 'still stretch', 'es')}"
+        f" of {args.still:g} s or more\n"
+    )
+    _tell_taken(folder, guessed, imported)
+    if imported.facts.left_out:
+        rows = _counted(imported.facts.left_out, "row", "s")
+        sys.stderr.write(f"{folder}: left out: {rows}\n")
+    if not imported.rests:
+        _tell_no_rests(args, about.get("units", {}))
+    sys.stdout.write(f"{folder}\n")
+    return imported
+
+
+def _stated_tables(args: argparse.Namespace, recording: Recording) -> dict[str, Any]:
+    """Tables of session.toml that the options state."""
+    from fieldcal.session.units import UNSCALED
+
+    name = recording.path.name.split(".")[0]
+    about: dict[str, Any] = {"format": 1, **site_tables(args, name)}
+    units = {"acceleration": args.acc_unit, "angular_rate": args.gyr_unit}
+    if kept := {k: u for k, u in units.items() if u in UNSCALED}:
+        about["units"] = kept
+    if args.rate and recording.wanted.rate_hz:
+        about["sampling"] = {"rate_hz": args.rate}
+    return about
+
+
+def _tell_taken(
+    folder: Path, guessed: Mapping[str, str], imported: ImportedSession
+) -> None:
+    """Say what was guessed, and what the import has to say."""
+    for what, why in guessed.items():
+        sys.stderr.write(f"{folder}: {what.replace('_', ' ')} taken as {why}\n")
+    for sentence in imported.says:
+        sys.stderr.write(f"{folder}: {sentence}\n")
+
+
+def _tell_no_rests(args: argparse.Namespace, units: Mapping[str, str]) -> None:
+    """Say what to do where no still stretch was found; `units` have no known size."""
+    if units:
+        sys.stderr.write(
+            f"nothing says what a {' or '.join(sorted(set(units.values())))} is worth,"
+            " so no still stretch was found: say how many make a g or deg/s, such as"
+            " --acc-unit g --acc-lsb 2048 --gyr-unit deg/s --gyr-lsb 16.4, or write"
+            " [nominal] scale factors and the positions into session.toml\n"
+        )
+    else:
+        shorter = ", or try --still with a shorter time" if args.still > 1 else ""
+        sys.stderr.write(f"write the positions into session.toml{shorter}\n")
+
+
+def _import_means(
+    args: argparse.Namespace,
+    recording: Recording,
+    stream: ImuStream,
+    folder: Path,
+    about: dict[str, Any],
+    scatter: MeanScatter,
+) -> ImportedSession:
+    """Make a session of a table of means."""
+    from fieldcal.importing.session.ingest import import_stream
+    from fieldcal.importing.tables.means import tables_of_means
+
+    gravity = float(about["site"].get("gravity", G0))
+    tables = tables_of_means(recording, stream.name, scatter, gravity, args.sigma)
+    guessed = about.pop("guessed", {}) | tables.pop("guessed", {})
+    about |= {"guessed": guessed} if guessed else {}
+    never = float("inf")
+    imported = import_stream(recording, stream.name, folder, about | tables, never)
+    sys.stderr.write(
+        f"{folder}: {stream.name}, {stream.says}:"
+        f" {_counted(imported.facts.rows, 'position', 's')}, means only: nothing that"
+        " goes on within a position or between two can be found\n"
+    )
+    _tell_taken(folder, guessed, imported)
+    sys.stdout.write(f"{folder}\n")
+    return imported
+
+
+def report_instances(folder: Path, rests: dict[str, Array], gravity: float) -> None:
+    """Report which of several IMUs in one log disagrees with the others."""
+    from fieldcal.evaluation.instances import compare_instances
+
+    found = compare_instances(rests, gravity)
+    for one in found if any(one.out for one in found) else []:
+        sys.stderr.write(f"{folder}: {one.sentence()}\n")
+
+
+def _counted(number: int, what: str, ending: str) -> str:
+    """Number with a noun, in the plural unless it is 1."""
+    return f"{number} {what}{ending if number != 1 else ''}"

@@ -11,6 +11,7 @@ Source: rotation kinematics to first order in phi.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,6 +101,12 @@ class Turns:
         self.first = np.unique(self.rows.x.position, return_index=True)[1]
         self.wander = self.rows.hand_angle[self.first]
         self.way = way and not dictionary.unoriented.any()
+
+    def with_dictionary(self, dictionary: Dictionary) -> Turns:
+        """The same turns with the columns of a copy of the dictionary."""
+        out = copy(self)
+        out.dictionary = dictionary
+        return out
 
     def linearised(
         self,

@@ -224,9 +224,8 @@ class Inference:
 def resume(better: Set, before: InferenceResult) -> InferenceResult:
     """Continue from a better set than that of an earlier result.
 
-    Columns are added to a copy of the fit: the earlier
-    result stands if this one is no better, and its Gram matrix has only the columns
-    that its dictionary had.
+    Columns are added to a copy of the fit: the earlier result stands if this one is no
+    better, and its Gram matrix has only the columns that its dictionary had.
     """
     own = Inference(before.fit.continuing_copy())
     return own.run_from(better, before.visited_keys)

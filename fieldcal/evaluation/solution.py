@@ -26,6 +26,7 @@ from fieldcal.evaluation.observations import (
 from fieldcal.evaluation.omitted_effects import (
     omitted_effects,
     with_description_faults,
+    with_impossible_scales,
     with_omitted_effects,
 )
 from fieldcal.evaluation.prepared_session import PreparedSession
@@ -117,6 +118,7 @@ def solve_prepared(
     calibration = with_omitted_effects(
         with_jump(calibration, shown), omitted_effects(shown, calibration)
     )
+    calibration = with_impossible_scales(shown, calibration)
     return with_description_faults(shown.prepared, calibration)
 
 

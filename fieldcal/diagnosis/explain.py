@@ -45,6 +45,7 @@ from fieldcal.model.search.inference import (
     TIME_CONSTANT_LOG_LOSS,
     Inference,
     InferenceResult,
+    resume,
 )
 from fieldcal.model.search.selection import MIN_LOG_RISE
 from fieldcal.model.search.settled_scores import correct_scores
@@ -208,8 +209,8 @@ def explain(
     The search begins with `before`, the explanation of a part of it, if that is given.
     """
     fit = build_fit(prepared.source, prepared.rows, prepared)
-    inference = Inference(fit)
-    found = inference.run(None if before is None else _starting_causes(before))
+    begin = None if before is None else _starting_causes(before)
+    found = Inference(fit).run(begin)
     posterior = _calculate_posterior(found)
     for _ in range(MAX_RESUMPTIONS):
         better, now = found.search.best_visited, found.best
@@ -219,16 +220,17 @@ def explain(
         ):
             break
         # an alias explains the rows better than the cause that it was an alias of
-        resumed = inference.resume(better, found)
+        resumed = resume(better, found)
         if resumed.best.score < now.score:  # about its own state it does not
             break
         found, posterior = resumed, _calculate_posterior(resumed)
+    fit = found.fit
     windows = fit.system.linearised(found.state)
     best = FittedSet(
         prepared.rows,
         fit.dictionary,
         windows,
-        fit.pad(found.values),  # a resumed search has added columns, also if in vain
+        found.values,
         average_over_sizes(found.search.sets, found.best),
     )
     enlarge_to_shown_grade(fit.dictionary, best.set, prepared.source.about)

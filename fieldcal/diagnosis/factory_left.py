@@ -21,7 +21,7 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import factory_groups, factory_sizes
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.two_grades import chances_of_coarser
-from fieldcal.model.posterior.model_average import eliminate_with_groups
+from fieldcal.model.evidence.unfitted_groups import eliminate_with, groups_not_in
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 
@@ -61,7 +61,7 @@ def enlarge_to_shown_grade(
         return
     stated, coarser = (factory_errors(about, grade) for grade in (None, shows.grade))
     larger = _groups_with_sizes(dictionary, stated, coarser)
-    beside = eliminate_with_groups(best, larger)
+    beside = eliminate_with(best, groups_not_in(best, larger))
     sizes = {}
     for kind, p in chances_of_coarser(beside, larger, coarser, stated).items():
         each = getattr(stated, kind), getattr(coarser, kind)

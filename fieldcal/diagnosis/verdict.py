@@ -17,6 +17,7 @@ from fieldcal.diagnosis.findings.agreement import UNITS, ModelResiduals
 from fieldcal.diagnosis.findings.calibrated import (
     calibration_groups,
     calibration_of_set,
+    impossible_turn_scales,
 )
 from fieldcal.diagnosis.findings.candidates import tried_candidates
 from fieldcal.diagnosis.findings.curves import residual_curves
@@ -206,6 +207,7 @@ def _impossible_facts(explanation: Explanation) -> list[str]:
         np.array([sigma for _, sigma, _ in calibration.values()]),
         Nominal(**{k: tuple(v.tolist()) for k, v in nominal.items()}),
     )
+    values += impossible_turn_scales(explanation).values()
     return values + misdirected_turns(_unexplained_turns(explanation))
 
 

@@ -22,7 +22,10 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.calibrated import calibration_of_set
+from fieldcal.diagnosis.findings.calibrated import (
+    calibration_of_set,
+    impossible_turn_scales,
+)
 from fieldcal.diagnosis.findings.unknown_mismatch import (
     angle_errors,
     exchanged_positions,
@@ -194,6 +197,27 @@ def with_description_faults(
                 " the numbers are those of"
                 f" {'samples that were put right' if mended else 'what it states'}"
             )
+    if not sentences:
+        return calibration
+    warnings = (*sentences, *calibration.warnings)
+    return replace(calibration, warnings=warnings, good=False)
+
+
+def with_impossible_scales(
+    explanation: Explanation, calibration: Calibration
+) -> Calibration:
+    """The calibration, marked as bad if what explains it has an impossible value.
+
+    Scale factors that it states itself are judged by their own values.
+    """
+    own = {*calibration.names}
+    sentences = [
+        "what explains the recording best is impossible, so that something else"
+        " happened in it; fieldcal diagnose says where it parts; take the positions"
+        f" again: {sentence}"
+        for name, sentence in impossible_turn_scales(explanation).items()
+        if name not in own
+    ]
     if not sentences:
         return calibration
     warnings = (*sentences, *calibration.warnings)

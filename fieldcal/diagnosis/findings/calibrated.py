@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.calibration.parameters import Nominal
+from fieldcal.calibration.plausible import implausible_values
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import CalibrationGroup, Quantity
@@ -11,6 +13,10 @@ from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.model_average import average_of_columns
 from fieldcal.model.posterior.size_average import average_over_sizes
+from fieldcal.model.state import State
+
+GYRO_SCALE = "gyro_scale"
+"""Effect of the catalogue: scale factors of gyroscopes that turns show."""
 
 GROUP_UNITS = {
     "acc_bias": "m/s^2",
@@ -53,6 +59,42 @@ def calibration_of_set(
     return _values_by_name(
         explanation, at, *average_of_columns([(reported, 1.0)], at, left)
     )
+
+
+def impossible_turn_scales(explanation: Explanation) -> dict[str, str]:
+    """Scale factors of gyroscopes, by the turns, that no sensor has; in sentences.
+
+    `solve` does not state those of axes about which the device was not turned. The
+    best set may need them all the same, to be rid of rates that contradict it; then it
+    is not what happened.
+    """
+    found = turn_scale_factors(explanation.best.set, explanation.inferred.fit.nominal)
+    about = explanation.prepared.source.about.nominal
+    nominal = Nominal(**{k: tuple(v.tolist()) for k, v in about.items()})
+    return {
+        name: sentence
+        for name, (value, sigma) in found.items()
+        for sentence in implausible_values(
+            [name], np.array([value]), np.array([sigma]), nominal
+        )
+    }
+
+
+def turn_scale_factors(fitted: Set, nominal: State) -> dict[str, tuple[float, float]]:
+    """Scale factors of the gyroscopes by the turns in a set, and sigma, by full name.
+
+    Empty if the set has no error of them.
+    """
+    out = {}
+    for group in (g for cause, g in fitted.members if cause.name == GYRO_SCALE):
+        at = fitted.state.places_of(group.columns)
+        error = np.sqrt(np.diag(fitted.state.inverse)[at])
+        for i, change, sigma in zip(
+            group.params, fitted.state.estimate[at], error, strict=True
+        ):
+            name = f"gyr_scale.{'xyz'[i]}"
+            out[name] = float(nominal.scale[3 + i] + change), float(sigma)
+    return out
 
 
 def averaged_calibration(

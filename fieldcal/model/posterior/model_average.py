@@ -31,6 +31,7 @@ from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.evidence.unfitted_groups import groups_not_in
 from fieldcal.model.posterior.common_axes import (
     group_in,
     parameter_rows,
@@ -148,23 +149,9 @@ def average_over_sets(
     return mean, cov + covariance_of_means(np.array(means), weight)  # (1)
 
 
-def _groups_not_in(fitted: Set, more: Sequence[Group]) -> list[Group]:
-    """Groups, each named by its part, of effects that a set does not contain."""
-    names = {cause.name for cause, _ in fitted.members}
-    return [group for group in more if group.part not in names]
-
-
-def eliminate_with_groups(fitted: Set, more: Sequence[Group]) -> Eliminated:
-    """Eliminate a set's columns and those groups of `more` that it lacks."""
-    missing, state = _groups_not_in(fitted, more), fitted.state
-    columns = np.concatenate([state.columns, *(group.columns for group in missing)])
-    sizes = np.concatenate([state.prior_sigma, *(group.typical for group in missing)])
-    return Eliminated.of(state.rows, columns, sizes)
-
-
 def set_estimate(fitted: Set, unfitted: Sequence[Group] = ()) -> Estimate:
     """Estimate of a set's columns, with the groups of `unfitted` eliminated, (2)."""
-    missing, posterior = _groups_not_in(fitted, unfitted), fitted.state
+    missing, posterior = groups_not_in(fitted, unfitted), fitted.state
     if not missing:
         return posterior.estimate, posterior.half.T
     columns = np.concatenate([group.columns for group in missing])

@@ -83,11 +83,13 @@ class BaseSway:
 def find_base_sway(block: Block, about: Description) -> BaseSway | None:
     """Sway of the base; None if it does not sway, or if this cannot be decided.
 
-    Gyroscopes separate rotation from acceleration; accelerometers alone do not. The
-    positions must be known, since a device in a hand also rotates.
+    Gyroscopes separate rotation from acceleration; accelerometers alone do not. Known
+    positions decide, since a device in a hand also rotates; on a base that sways there,
+    it sways in the others as well.
     """
     gyroscopes = np.isfinite(block.gyr).any(axis=0)
-    if not _on_known_positions(about) or gyroscopes.any() != gyroscopes.all():
+    fixed = _known_positions(about)
+    if not fixed or gyroscopes.any() != gyroscopes.all():
         return None
     windows = window_bounds(block, about)
     unit = np.concatenate([about.nominal[n] for n in ("acc_scale", "gyr_scale")])
@@ -97,13 +99,11 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
         for p, (a, b) in enumerate(windows)
         if b > a and (waves := find_sway(felt.t[a:b], felt[a:b].six))
     }
-    if len(waves_by_position) < MIN_SWAYING_SHARE * len(windows):
+    swaying = [waves_by_position[p] for p in fixed if p in waves_by_position]
+    if len(swaying) < MIN_SWAYING_SHARE * len(fixed):
         return None
     sizes = np.array(
-        [
-            np.mean([w.mean_squares for w in waves], axis=0)
-            for waves in waves_by_position.values()
-        ]
+        [np.mean([w.mean_squares for w in waves], axis=0) for waves in swaying]
     )
     amplitude = np.sqrt(2 * sizes[:, 0])
     if np.sqrt((amplitude**2).mean()) < MIN_SWAY_RAD:
@@ -118,7 +118,7 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
         else:
             seen = _unseen_sway_variance(sizes.mean(axis=0), block.t[a:b])
             left.append(seen * np.repeat([about.gravity**2, 1.0], 3))
-    root = np.sqrt(max(len(waves_by_position) - 1, 1))
+    root = np.sqrt(max(len(swaying) - 1, 1))
     noise = [w.noise * w.length for waves in waves_by_position.values() for w in waves]
     steady = _without_sway(felt, windows, waves_by_position)
     return BaseSway(
@@ -145,11 +145,16 @@ def _unseen_sway_variance(size: Array, t: Array) -> Array:
     return np.repeat([turned, 2 * size[0] / length**2], 3)
 
 
-def _on_known_positions(about: Description) -> bool:
-    """Whether the device is held in positions that are known, and on no rate table."""
+def _known_positions(about: Description) -> list[int]:
+    """Positions whose attitude is known; none if a rate table turns the device.
+
+    One among others that are not known tells no base from a hand.
+    """
     positions = about.positions
-    known = all(p.oriented for p in positions)
-    return bool(positions) and known and not table_rates(positions).any()
+    if not positions or table_rates(positions).any():
+        return []
+    fixed = [i for i, p in enumerate(positions) if p.oriented]
+    return [] if len(fixed) == 1 < len(positions) else fixed
 
 
 def _without_sway(

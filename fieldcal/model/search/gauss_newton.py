@@ -59,6 +59,13 @@ class GaussNewton:
         fit.turn_rows = list(turn_rows)
         return fit
 
+    def continuing_copy(self) -> GaussNewton:
+        """A copy that also linearises the turns, to which columns can be added."""
+        fit = self.independent_copy(self.turn_rows)
+        if self.turns is not None:
+            fit.turns = self.turns.with_dictionary(fit.dictionary)
+        return fit
+
     def pad(self, values: Array) -> Array:
         """Values of columns, padded with zeros for columns that were added since."""
         return np.pad(values, (0, self.dictionary.width - len(values)))

@@ -112,14 +112,14 @@ class Inference:
         dictionary.add_causes(proportional_causes(dictionary, list(about)))
         return self._iterate(state, values, best, thorough=begin is None)
 
-    def resume(self, better: Set, before: InferenceResult) -> InferenceResult:
-        """Continue from a better set than that of an earlier result.
+    def run_from(self, better: Set, visited_keys: frozenset[SetKey]) -> InferenceResult:
+        """Search from a set until set and state no longer change.
 
         It ends at a set that was visited before: sets of about equal weight would
         otherwise lead to each other in a cycle.
         """
         state, values = self._state_without_causes()
-        return self._iterate(state, values, better, False, before.visited_keys)
+        return self._iterate(state, values, better, False, visited_keys)
 
     def hold(self, members: Sequence[Member]) -> InferenceResult:
         """The result with some members of any dictionary, without a search."""
@@ -219,6 +219,16 @@ class Inference:
                 turn_rows = self.fit.turn_rows
         self.fit.turn_rows = turn_rows
         return best
+
+
+def resume(better: Set, before: InferenceResult) -> InferenceResult:
+    """Continue from a better set than that of an earlier result.
+
+    Columns are added to a copy of the fit: the earlier result stands if this one is no
+    better, and its Gram matrix has only the columns that its dictionary had.
+    """
+    own = Inference(before.fit.continuing_copy())
+    return own.run_from(better, before.visited_keys)
 
 
 def _search_from(search: Search, members: tuple[Member, ...], thorough: bool) -> Set:

@@ -2,7 +2,8 @@
 
 They determine only columns that no window shows. Columns that windows show keep the
 estimates and uncertainties of the windows, because during a turn the attitude is known
-by interpolation only, (2) of `turn`. White noise of the gyroscopes with the density N,
+by interpolation only, (2) of `turn`. The windows' set has what a factory leaves of
+other effects in its state (`Turns`). White noise of the gyroscopes with the density N,
 rad/s/sqrt(Hz), makes phi_k - u phi_T a Brownian bridge with the covariance, rad^2,
 
     N^2 (min(t, t') - u' t - u t' + u u' T)                                         (1)

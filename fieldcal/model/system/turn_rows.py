@@ -11,6 +11,7 @@ Source: rotation kinematics to first order in phi.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import triads_of
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.unfitted_groups import eliminate_with, parameters_not_in
 from fieldcal.model.rows.hand_tremor import turned_force
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
@@ -101,6 +103,12 @@ class Turns:
         self.wander = self.rows.hand_angle[self.first]
         self.way = way and not dictionary.unoriented.any()
 
+    def with_dictionary(self, dictionary: Dictionary) -> Turns:
+        """The same turns with the columns of a copy of the dictionary."""
+        out = copy(self)
+        out.dictionary = dictionary
+        return out
+
     def linearised(
         self,
         state: State,
@@ -114,7 +122,7 @@ class Turns:
         fitted to them. If `known` is None, accelerometers during turns are not used.
         """
         seen = self.way and known is not None and not _has_unknown_acc_cause(known)
-        self.known = known if seen else None
+        self.known = self._with_factory_errors(known) if known and seen else None
         self.at_ends = {
             first: EndColumns.of(first, one, self.rows.x, state)
             for first, one in self.dictionary.bases
@@ -143,6 +151,15 @@ class Turns:
                 replace(turn.x, f=turn.force_without_way_effects), less
             )
             yield state.output(turn.x, since) - less.output(x, since)
+
+    def _with_factory_errors(self, known: Set) -> Set:
+        """A set with what the factory may have left of other effects in its state.
+
+        Windows may hide it, as two of them hide cross-coupling behind bias and scale
+        factor; forces on the way do not.
+        """
+        left = list(parameters_not_in(known, self.dictionary.unfitted))
+        return replace(known, state=eliminate_with(known, left)) if left else known
 
     # -- rows
 

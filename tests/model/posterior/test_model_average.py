@@ -13,12 +13,12 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.unfitted_groups import eliminate_with, groups_not_in
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.posterior.model_average import (
     ModelAverage,
     average_of_columns,
     average_over_sets,
-    eliminate_with_groups,
 )
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.size_average import average_over_sizes
@@ -127,7 +127,7 @@ def test_what_is_in_no_set_is_eliminated_beside_it() -> None:
     search = SESSION.search(off)
     lacks = search.sets.evaluate(((QUADRATIC, group),))
     has = search.sets.evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
-    whole = eliminate_with_groups(lacks, [left])
+    whole = eliminate_with(lacks, groups_not_in(lacks, [left]))
     columns = np.concatenate([lacks.state.columns, left.columns])
     np.testing.assert_array_equal(whole.columns, columns)
     wide = np.concatenate([lacks.state.prior_sigma, left.typical])
@@ -136,7 +136,7 @@ def test_what_is_in_no_set_is_eliminated_beside_it() -> None:
     np.testing.assert_allclose(whole.inverse, np.linalg.inv(inner), 1e-6, 1e-20)
     expected = np.linalg.solve(inner, rows.rhs(columns))
     np.testing.assert_allclose(whole.estimate, expected, rtol=1e-6, atol=1e-12)
-    same = eliminate_with_groups(has, [left])
+    same = eliminate_with(has, groups_not_in(has, [left]))
     np.testing.assert_array_equal(same.columns, has.state.columns)
 
 

@@ -191,6 +191,32 @@ def test_between_windows_a_device_that_only_sways_turns_by_nothing() -> None:
         assert abs(angle) < np.deg2rad(0.004)
 
 
+@pytest.mark.parametrize(("known", "base"), [(4, True), (2, True), (1, False)])
+def test_where_known_positions_sway_the_others_do(known: int, base: bool) -> None:
+    """Faces without angles beside a ladder; one known position tells no base."""
+    rng, rate, size = np.random.default_rng(4), 25.0, np.deg2rad(0.9)
+    t = np.arange(0.0, 140.0, 1 / rate)
+    turned = size * np.sin(2 * np.pi * 0.31 * t)
+    still = rng.normal(size=(len(t), 6)) * NOISE + [0.0, G0, 0.0, 0.0, 0.0, 0.0]
+    six = still.copy()
+    six[:, 1:3] += G0 * np.column_stack([np.cos(turned) - 1, -np.sin(turned)])
+    six[:, 3] += np.gradient(turned, t)
+    held = [(2.0 + 34 * i, 32.0 + 34 * i) for i in range(4)]
+    places: list[dict[str, Any]] = [{"start_s": a, "end_s": b} for a, b in held]
+    for place in places[:known]:
+        place |= {"alpha_deg": 0.0, "beta_deg": 0.0}
+    about = description.parse_description({"position": places})
+    block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
+    found = find_base_sway(block, about)
+    assert (found is not None) == base
+    if found is not None:
+        assert found.amplitude == pytest.approx(size, rel=0.05)
+        for a, b in held:
+            some = (t >= a) & (t < b)
+            spread = (found.block.six[some] - still[some]).std(axis=0)
+            assert (spread < 0.5 * NOISE).all()
+
+
 def test_two_stretches_of_a_window_are_as_uncertain_as_their_mean() -> None:
     """A window of eighty seconds beside some of thirty, on a base that sways."""
     rng, rate = np.random.default_rng(2), 25.0

@@ -19,9 +19,10 @@ from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
-from fieldcal.model.search.inference import Inference, InferenceResult
+from fieldcal.model.search.inference import Inference, InferenceResult, resume
 from fieldcal.model.search.offer import OfferTable
 from fieldcal.model.search.offered_pairs import offered_pairs
+from fieldcal.model.search.offers import Offers
 from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State, Term
@@ -124,12 +125,23 @@ def test_a_better_set_is_gone_on_from_until_one_comes_again() -> None:
     told = settling()
     fit = fit_of(state_of(SETTLING))
     start = Inference(fit).hold(())
-    found = Inference(fit).resume(start.best, start)
+    found = resume(start.best, start)
     assert found.best.keys == told.best.keys
     assert chi2(found) == pytest.approx(1.0, abs=0.2)
     (_, group), (_, other) = (r.best.members[0] for r in (found, told))
     assert group.shape["tau_s"] == pytest.approx(other.shape["tau_s"], rel=0.02)
     assert Sets.key(start.best.members) in found.visited_keys
+
+
+def test_what_is_gone_on_from_keeps_its_columns() -> None:
+    """If nothing better comes of it, it can still be asked which causes it lacks."""
+    start = Inference(fit_of(state_of(SETTLING))).hold(())
+    offered = [o.member[0].key for o in start.search.offers.ranked(start.best)]
+    width = start.fit.dictionary.width
+    found = resume(start.best, start)
+    assert found.fit.dictionary.width > width == start.fit.dictionary.width
+    again = Offers(start.search.sets).ranked(start.best)
+    assert [o.member[0].key for o in again] == offered
 
 
 def test_the_state_is_what_the_columns_say() -> None:

@@ -16,7 +16,7 @@ from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.search.gauss_newton import GaussNewton
-from fieldcal.model.search.inference import Inference
+from fieldcal.model.search.inference import Inference, resume
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import estimates_by_column
@@ -111,12 +111,10 @@ def test_what_was_gone_through_is_not_gone_through_again(
 
     monkeypatch.setattr(Search, "run", kept)
     nothing = found.search.sets.evaluate(())
-    again = Inference(found.fit).resume(nothing, found)
+    again = resume(nothing, found)
     assert again.best.keys == found.best.keys and len(runs) > 1
     first = Sets.key(runs[0].members)
     runs.clear()
-    ended = Inference(found.fit).resume(
-        nothing, replace(found, visited_keys=frozenset({first}))
-    )
+    ended = resume(nothing, replace(found, visited_keys=frozenset({first})))
     assert [Sets.key(one.members) for one in runs] == [first]
     assert Sets.key(ended.best.members) == first

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
@@ -180,6 +181,20 @@ def test_the_way_is_what_the_columns_foretell(name: str) -> None:
         assert rest < 0.02 * size + 1.4 * np.sqrt(len(turn.way))
         largest = max(largest, float(size))
     assert largest > 100
+
+
+def test_what_two_windows_hide_is_no_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cross-coupling is bias and scale factor in two windows, and shows on the way."""
+    monkeypatch.setattr(sys.modules[__name__], "PLACES", ((0.0, 0.0), (45.0, 5.0)))
+    coupled = checked_effect("cross_coupling", {"k31": 2e-3, "k12": -1e-3})
+    fit, _, (turn,) = followed(*recorded(coupled))
+    assert fit.dictionary.filters is not None
+    squares = fit.dictionary.filters.columns[:2]
+    seen = turn.way_design[:, np.isin(turn.columns, squares)]
+    info = seen.T @ seen
+    off = np.linalg.solve(info, seen.T @ turn.way)
+    assert np.abs(off / np.sqrt(np.diag(np.linalg.inv(info)))).max() < 3
+    assert turn.way @ turn.way < 1.5 * len(turn.way)
 
 
 @pytest.mark.parametrize("name", ["gyro_scale", "gyro_cross_coupling"])

@@ -205,7 +205,7 @@ def test_where_known_positions_sway_the_others_do(known: int, base: bool) -> Non
     places: list[dict[str, Any]] = [{"start_s": a, "end_s": b} for a, b in held]
     for place in places[:known]:
         place |= {"alpha_deg": 0.0, "beta_deg": 0.0}
-    about = description.parse_description({"position": places})
+    about = description_file.parse_description({"position": places})
     block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
     found = find_base_sway(block, about)
     assert (found is not None) == base

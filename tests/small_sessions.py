@@ -15,7 +15,7 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Sets
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import Block
-from fieldcal.model.rows.reduce import RowSource
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import Description
 from fieldcal.session.description_file import parse_description

@@ -25,7 +25,7 @@ from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram

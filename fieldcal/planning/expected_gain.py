@@ -45,7 +45,7 @@ from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
 from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import LOG_DENSITY
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.state import State
 

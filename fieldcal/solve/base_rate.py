@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.core.base_motion import BaseMotion
 from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 
 
 def known_earth_rate(

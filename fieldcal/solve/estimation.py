@@ -19,7 +19,8 @@ from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.two_grades import chances_of_coarser
 from fieldcal.model.posterior.mixture import Mixture
-from fieldcal.model.rows.reduce import Rows, RowSource
+from fieldcal.model.rows.averages import Rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn_tracker import TurnTracker

@@ -16,8 +16,8 @@ from fieldcal.calibration import Nominal
 from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home, specific_force_at_home
 from fieldcal.core.positions import attitude_sigmas, gamma_angles, unknown_axis_speeds
 from fieldcal.core.samples import ACC, GYR, Array
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.orientation import force_along_mean
-from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.rows.turntable import GyroReadings
 from fieldcal.physics.experience import Experience
 from fieldcal.solve.estimation import RecordedRows

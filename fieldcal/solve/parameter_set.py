@@ -28,7 +28,7 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import effect_group, factory_groups
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.physics.effect import Effect
 from fieldcal.solve.explanations import (
     WeightedExplanation,

@@ -16,7 +16,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.posterior.mixture import Mixture
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns

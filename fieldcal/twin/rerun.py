@@ -27,7 +27,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.turns.turn import Turn

@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
 from fieldcal.diagnosis.result import Quality
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 
 UNITS = ("m/s^2", "rad/s")
 

@@ -16,7 +16,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.agreement import ModelResiduals
 from fieldcal.diagnosis.findings.stretch_means import part_means
 from fieldcal.diagnosis.result import Curve, Mismatch
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 
 
 def residual_curves(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 
 PART_ENDS = (0.0, 0.1, 0.25, 0.5, 1.0)
 """Ends of the parts of a window over which residuals are averaged."""

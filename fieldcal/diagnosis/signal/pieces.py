@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import sampling_rate
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.change_points import clear_jumps
-from fieldcal.model.rows.reduce import Rows, RowSource
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.physics.experience import Experience
 

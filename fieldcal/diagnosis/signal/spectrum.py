@@ -39,7 +39,8 @@ from fieldcal.diagnosis.signal.pieces import (
 )
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
-from fieldcal.model.rows.reduce import Rows, RowSource
+from fieldcal.model.rows.averages import Rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.physics.effect import Line
 
 MAX_LINES, MAX_REJECTED_PEAKS = 4, 3

@@ -40,8 +40,8 @@ from fieldcal.model.causes import smooth
 from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander_sizes import wander_sizes
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.lean_modes import lean_modes
-from fieldcal.model.rows.reduce import Rows
 
 COSINES_PER_VISIBLE = 2.0
 """Number of cosines used over the number that each exceed the noise of the rows."""

@@ -35,7 +35,7 @@ from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.physics.effect import Scatter
 
 CHI2_MEDIAN, MEDIAN_LOG_SCATTER = 0.4549, 2.7

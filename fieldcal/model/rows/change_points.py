@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 
 ROWS_BESIDE = (1, 2, 4, 8)
 """Rows on either side: a jump amid flicker shows best in some of them."""

@@ -42,6 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import GYR, Array, Index
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.hand_drift import (
     STEADY_HAND_K,
@@ -51,7 +52,8 @@ from fieldcal.model.rows.hand_drift import (
 )
 from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.noise import rounding_noise
-from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
+from fieldcal.model.rows.reduce import reduce_to_rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.windows.noise import is_to_and_fro, quickest_noise
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 
 
 def lean_modes(rows: Rows) -> Index:

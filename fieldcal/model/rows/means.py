@@ -13,7 +13,8 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.reduce import Rows, RowSource, average_rows
+from fieldcal.model.rows.averages import Rows, average_rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
 
 

@@ -8,129 +8,20 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.positions import alpha_beta_angles, attitude_sigmas, gamma_angles
 from fieldcal.core.samples import Array, Block
-from fieldcal.core.sampling import sampling_rate
-from fieldcal.model.rows.block_means import block_means, masked
+from fieldcal.model.rows.averages import Rows, average_rows
+from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.noise import rounding_sigma, shared_rounding_sigma
-from fieldcal.model.rows.orientation import (
-    force_from_outputs,
-    gyro_readings,
-    known_angles,
-    known_attitudes,
-)
-from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.model.rows.turntable import fit_rotating_earth_rate
-from fieldcal.model.rows.vibration import WindowNoise, measure_window_noise
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import block_bounds, window_bounds
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.joint_turns import JointTurns
-from fieldcal.session.description import Description
-from fieldcal.session.site_gravity import gravity_sigma
 from fieldcal.windows.dead_band import dead_bands, error_of_means
-
-
-@dataclass(frozen=True, slots=True)
-class Rows:
-    """Block means, and the inputs of the device in each.
-
-    Attributes
-    ----------
-    x : n rows
-    y : (n, 6) means, m/s^2 and rad/s; nan where no sample was usable
-    sd : (n, 6) standard deviation of each mean from white noise
-    window_error : (n, 6) standard deviation of an error that all rows of a window share
-    length : (n,) s
-    noise : (6,) standard deviation of one sample
-    span : (n, 2) instants of the first and the last sample, s
-    hand_angle : (n, 3) rms angle by which a hand turns the device about each axis
-        within the window, rad
-    session_error : (6,) standard deviation of an error that all windows share
-
-    """
-
-    x: Experience
-    y: Array
-    sd: Array
-    window_error: Array
-    length: Array
-    noise: Array
-    span: Array
-    hand_angle: Array
-    session_error: Array = field(default_factory=lambda: np.zeros(6))
-
-    @property
-    def used(self) -> NDArray[np.bool_]:
-        """Means that can be used, (n, 6)."""
-        return np.isfinite(self.y) & np.isfinite(self.sd)
-
-    def without(self, left: NDArray[np.bool_]) -> Rows:
-        """The rows with those marked in `left` (n,) made unusable."""
-        return replace(self, sd=np.where(left[:, None], np.nan, self.sd))
-
-
-@dataclass(frozen=True)
-class RowSource:
-    """Samples of a session, with what is needed to reduce them to rows.
-
-    Attributes
-    ----------
-    block : the samples, corrected
-    about : description of the session
-    usable : (n, 6) samples that may be used
-    rest_began : (p,) instant from which the device was at rest in each position, s
-    thermometer : the temperature
-    pace : seconds of the device's clock in a true second
-    sway_variance : (p, 6) variance of each window's mean that remains after a base's
-        sway was subtracted, SI squared; None if the base does not sway
-    sway_noise : (6,) standard deviation of one sample on such a base; the subtraction
-        removes slow noise as well
-    sway_gravity_sigma : m/s^2, standard deviation of the apparent loss of gravity by
-        sway
-
-    """
-
-    block: Block
-    about: Description
-    usable: NDArray[np.bool_]
-    rest_began: Array
-    thermometer: Thermometer
-    pace: float = 1.0
-    sway_variance: Array | None = None
-    sway_noise: Array | None = None
-    sway_gravity_sigma: float = 0.0
-
-    @property
-    def complete_samples(self) -> RowSource:
-        """The source with only those samples whose outputs are all usable.
-
-        Unchanged if there are no such samples, or no others.
-        """
-        every = self.usable.all(axis=1)
-        if every.all() or not every.any():
-            return self
-        kept = {f.name: getattr(self.block, f.name)[every] for f in fields(Block)}
-        return replace(self, block=Block(**kept), usable=self.usable[every])
-
-    @cached_property
-    def rate(self) -> float:
-        """Samples a second."""
-        return sampling_rate(self.block)
-
-    @cached_property
-    def window_noise(self) -> WindowNoise:
-        """Noise of the windows that have samples."""
-        block = masked(self.block, self.usable)
-        windows = window_bounds(block, self.about)
-        held = np.diff(windows, axis=1)[:, 0] > 1
-        return measure_window_noise(block, windows[held], self.rate)
 
 
 def reduce_to_rows(
@@ -282,114 +173,3 @@ def _errors_of_values(
     # what a band hides of a gyroscope at rest is the same in each window
     alike[3:] = np.hypot(alike[3:], hidden[:, 3:].max(axis=0, initial=0.0))
     return off, alike
-
-
-def average_rows(
-    source: RowSource,
-    bound: NDArray[np.intp],
-    position: NDArray[np.intp],
-    level: Array,
-    noise: Array,
-    variance: Array,
-) -> Rows:
-    """Average samples between bounds to rows.
-
-    Parameters
-    ----------
-    bound : (n, 2) first and one past the last sample of each row
-    position : (n,) index of each row's position
-    level : (n, 6) standard deviation of one sample in each row
-    noise : (6,) usual standard deviation of one sample
-    variance : (n, 3) of the samples of the accelerometers, squares of the outputs
-
-    """
-    block = source.block
-    y, count = block_means(masked(block, source.usable), bound)
-    sd = level / np.sqrt(np.maximum(count, 1))
-    # an output that never changes has no information
-    informative = (count > 0) & (sd > 0)
-    sd = np.where(informative, sd, np.nan)
-    span = np.column_stack([block.t[bound[:, 0]], block.t[bound[:, 1] - 1]])
-    length = np.diff(bound, axis=1)[:, 0] / sampling_rate(block)
-    x = _experience(source, position, y, span.mean(axis=1), length, variance)
-    sd[~x.force_known | _lacks_direction(x, y), :3] = np.nan
-    scale = source.about.nominal["gyr_scale"]
-    _subtract_rotating_earth_rate(x, y[:, 3:], sd[:, 3:], length, scale)
-    still = np.zeros((len(y), 3))
-    return Rows(x, y, sd, np.zeros_like(sd), length, noise, span, still)
-
-
-def _lacks_direction(x: Experience, y: Array) -> NDArray[np.bool_]:
-    """Rows of free positions in which an accelerometer was never measured, (n,).
-
-    The other two do not tell where the force points.
-    """
-    out = np.zeros(len(y), dtype=bool)
-    for p in np.unique(x.position[~x.oriented]):
-        here = x.position == p
-        out[here] = np.isnan(y[here, :3]).all(axis=0).any()
-    return out
-
-
-def _experience(
-    source: RowSource,
-    position: NDArray[np.intp],
-    y: Array,
-    t: Array,
-    length: Array,
-    variance: Array,
-) -> Experience:
-    """Inputs of the device in rows of outputs (n, 6) at t, `length` (n,) s each."""
-    about = source.about
-    warming, heating = source.thermometer.at(t)
-    gyroscopes = gyro_readings(about, position, y[:, 3:])
-    x = Experience.at_rest(
-        *known_angles(about, position),
-        about.gravity,
-        f=force_from_outputs(about, position, y[:, :3]),
-        t=t,
-        lasts=length,
-        since_start=t - source.block.t[0],
-        since_turn=t - source.rest_began[position],
-        warming=warming,
-        heating=heating,
-        variance=np.nan_to_num(variance) / about.nominal["acc_scale"] ** 2,
-        position=position,
-        rate=gyroscopes.rates(about.mounting),
-        base_force=about.base_force,
-        base_rate=about.base_rate,
-        transport=about.base_motion.rate,
-        mounting=about.mounting,
-        latitude=about.latitude,
-        gravity_sigma=float(np.hypot(gravity_sigma(about), source.sway_gravity_sigma)),
-        joint_turns=_joint_turns(source),
-        **known_attitudes(about, position),
-    )
-    return gyroscopes.with_earth_rates(x)
-
-
-def _joint_turns(source: RowSource) -> JointTurns:
-    """Turns of the joints, as far as the positions' angles are known.
-
-    Measured attitudes are not used: their angles are not those of joints. Nor are
-    positions without samples: nobody knows when, or whether, the joints went there.
-    """
-    positions = source.about.positions
-    if not positions:
-        return JointTurns.none()
-    known = np.column_stack([*alpha_beta_angles(positions), gamma_angles(positions)])
-    known[np.isfinite(attitude_sigmas(positions))] = np.nan
-    held = np.diff(window_bounds(source.block, source.about), axis=1)[:, 0] > 0
-    return JointTurns.of(source.rest_began[: len(known)][held], known[held])
-
-
-def _subtract_rotating_earth_rate(
-    x: Experience, gyr: Array, sd: Array, length: Array, scale: Array
-) -> None:
-    """Subtract the Earth's rate that rotates with a rate table from means (n, 3)."""
-    for p in np.unique(x.position[x.rate.any(axis=1)]):
-        at = np.flatnonzero(x.position == p)
-        rate = x.rate[at[0]] @ x.mounting
-        gyr[at] -= fit_rotating_earth_rate(
-            x.t[at], rate, gyr[at], sd[at], scale, length[at]
-        ).values

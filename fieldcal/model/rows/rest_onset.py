@@ -13,7 +13,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.block_means import block_means
-from fieldcal.model.rows.reduce import RowSource
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 

@@ -12,7 +12,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.system.linear_rows import LinearRows
 
 

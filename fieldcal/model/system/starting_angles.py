@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldcal.core.frames import in_procedure_axes, wrap_angle
 from fieldcal.core.samples import ACC, Array
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
 

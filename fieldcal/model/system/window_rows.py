@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import (

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.reduce import RowSource
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.turns.attitude import interpolate_vectors
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience

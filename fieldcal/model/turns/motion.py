@@ -6,7 +6,8 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import has_no_pause
-from fieldcal.model.rows.reduce import Rows, RowSource
+from fieldcal.model.rows.averages import Rows
+from fieldcal.model.rows.row_source import RowSource
 
 MARGIN_S = 0.6
 """Time before and after the motion that belongs to the integrated turn, s."""

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.rows.reduce import RowSource
+from fieldcal.model.rows.row_source import RowSource
 
 WINDOW_EDGE_S = 10.0
 """Part of a window next to the turn in which sway is measured, s."""

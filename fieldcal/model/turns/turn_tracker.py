@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.rows.reduce import Rows, RowSource
+from fieldcal.model.rows.averages import Rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.model.state import State
 from fieldcal.model.turns.attitude import (

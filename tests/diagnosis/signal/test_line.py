@@ -15,7 +15,8 @@ from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import WindowSamples, samples_of_windows
 from fieldcal.effects.hum import Hum
 from fieldcal.effects.sway import Sway
-from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
+from fieldcal.model.rows.reduce import reduce_to_rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
 from fieldcal.session.description_file import parse_description

@@ -8,7 +8,8 @@ import pytest
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.signal.line import SpectralLine
 from fieldcal.diagnosis.signal.spectrum import find_lines
-from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
+from fieldcal.model.rows.reduce import reduce_to_rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description_file import parse_description
 

@@ -11,7 +11,7 @@ from small_sessions import SD, ladder, rows_of
 from fieldcal.model import priors
 from fieldcal.model.causes import smooth
 from fieldcal.model.causes.wander import Wander
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.physics.experience_rows import select_rows
 
 X = ladder(rows=30)

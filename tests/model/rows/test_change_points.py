@@ -9,8 +9,8 @@ import pytest
 from small_sessions import SD, ladder, rows_of
 
 from fieldcal.core.samples import Array
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.change_points import change_points, clear_jumps
-from fieldcal.model.rows.reduce import Rows
 
 
 def rows(y: Array) -> Rows:

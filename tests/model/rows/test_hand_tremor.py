@@ -11,9 +11,11 @@ from small_sessions import LADDER, SD, ladder, rows_of
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows import hand_tremor
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.hand_tremor import force_wander_angle, turned_force
 from fieldcal.model.rows.hand_tremor import rows_of_recording as rows_in_a_hand
-from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
+from fieldcal.model.rows.reduce import reduce_to_rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description_file import parse_description
 

@@ -10,7 +10,7 @@ from still_samples import FORCE, G, about, place, samples, source
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.model.rows.orientation import gyro_readings
-from fieldcal.model.rows.reduce import average_rows, reduce_to_rows
+from fieldcal.model.rows.reduce import reduce_to_rows
 
 
 def test_rows_are_means_over_a_second_with_their_noise() -> None:
@@ -194,22 +194,6 @@ def test_where_the_force_points_is_not_known_of_two_axes() -> None:
     assert rows.used[~first].all()
     told = reduce_to_rows(source(some, about(*held)))
     np.testing.assert_array_equal(told.used[first, :3], [[True, False, True]] * 6)
-
-
-def test_averages_between_any_bounds() -> None:
-    block = samples(10.0)
-    one = source(block, about(place(2.0, 5.0), place(6.0, 12.0)))
-    bound = np.array([[10, 20], [20, 60], [200, 204]])
-    level, noise = np.full((3, 6), 2.0), np.full(6, 7.0)
-    variance = np.arange(9.0).reshape(3, 3)
-    rows = average_rows(one, bound, np.array([0, 0, 1]), level, noise, variance)
-    for i, (a, b) in enumerate(bound):
-        np.testing.assert_allclose(rows.y[i], block.six[a:b].mean(axis=0), atol=1e-12)
-        np.testing.assert_allclose(rows.sd[i], 2.0 / np.sqrt(b - a))
-    np.testing.assert_allclose(rows.length, [0.2, 0.8, 0.08])
-    np.testing.assert_array_equal(rows.noise, noise)
-    np.testing.assert_array_equal(rows.x.variance, variance)
-    assert not rows.window_error.any()
 
 
 def test_a_table_that_turns_hides_the_force_across_its_axis() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.rest_onset import rest_instants, window_starts
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import Description
 from fieldcal.session.description_file import parse_description

@@ -12,7 +12,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.rows.averages import Rows
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.search.selection import Search

@@ -10,7 +10,7 @@ import pytest
 from fieldcal.core.frames import direction_cosines
 from fieldcal.core.rotation import cross_matrix, rotation_matrices
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.reduce import RowSource
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns import integration
 from fieldcal.model.turns.attitude import (

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
+from fieldcal.model.rows.averages import Rows
+from fieldcal.model.rows.reduce import reduce_to_rows
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns.motion import motion_bounds
 from fieldcal.model.turns.turn_tracker import TurnTracker

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.reduce import RowSource
+from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns.tremor import MIN_SAMPLES, sway_at_ends, sway_variance
 from fieldcal.session.description_file import parse_description

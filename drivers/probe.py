@@ -52,6 +52,7 @@ class DetectedDevice(NamedTuple):
     baud : rate at which it was known, 0 if none
     rate_hz : samples a second, as they arrived
     says : one sentence
+    mixed : what shows that two devices send on it; empty if they do not
 
     """
 
@@ -61,6 +62,7 @@ class DetectedDevice(NamedTuple):
     baud: int
     rate_hz: float
     says: str
+    mixed: str = ""
 
 
 def baud_rates() -> list[int]:
@@ -130,8 +132,9 @@ def _identify(
         says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
         if "gx" in query and "gyr_unit" not in query:
             says += UNKNOWN_GYRO_UNIT
-        says += _two_devices(name, like.query, data)
-        return DetectedDevice(port, url, name, baud, rate, says)
+        if mixed := _two_devices(name, like.query, data):
+            says += f"; {mixed}: {GIVE_EACH_A_PORT}"
+        return DetectedDevice(port, url, name, baud, rate, says, mixed)
     if heard := detect_autopilot(data):
         query = f"&{heard.query}" if heard.query else ""
         url, rate = f"mavlink:{port}?baud={baud}{query}", heard.samples / took
@@ -144,11 +147,10 @@ def _identify(
 
 
 def _two_devices(name: str, query: str, data: bytes) -> str:
-    """What to say if two devices send these bytes; empty if one does."""
+    """What shows that two devices send these bytes; empty if one does."""
     declared = f"{query}&rate=1" if query else "rate=1"
     block = open_codec(name, Options("probe", declared)).feed(data, 0.0)
-    said = "" if block is None else mixed_samples_text(block.six)
-    return f"; {said}: {GIVE_EACH_A_PORT}" if said else ""
+    return "" if block is None else mixed_samples_text(block.six)
 
 
 def _recognise_names(

@@ -37,7 +37,7 @@ def find_device(args: argparse.Namespace, mounted: bool = False) -> None:
     Raises
     ------
     InputError
-        If none answers, or several do.
+        If none answers, or several do, also on one port.
     Stopped
         If the user declines the device.
 
@@ -47,8 +47,11 @@ def find_device(args: argparse.Namespace, mounted: bool = False) -> None:
         introduce_device,
         rate_unit_from_turn,
     )
+    from fieldcal.session.mixed_devices import GIVE_EACH_A_PORT
 
     found = _only_answering_device()
+    if found.mixed:
+        raise InputError(f"{found.port}: {found.mixed}: {GIVE_EACH_A_PORT}")
     url = found.url
     gravity = args.gravity or DEFAULT_GRAVITY
     with _open_device(url) as driver:

@@ -68,9 +68,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal.commands.stored_sessions import tell_shorter_copies
     from fieldcal.core.errors import InputError
     from fieldcal.history.location import default_location
-    from fieldcal.history.repeats import copy_sentence, shorter_copies
     from fieldcal.history.store import History
 
     history = History(args.history or default_location())
@@ -85,9 +85,7 @@ def run(args: argparse.Namespace) -> int:
             f"{history.database.location_text} has no calibration of {args.serial}; it"
             f" has {known}"
         )
-    wanted = {"serial": args.serial}
-    for pair in history.database.run(lambda db: shorter_copies(db, wanted)):
-        sys.stderr.write(f"fieldcal history: {copy_sentence(*pair)}\n")
+    tell_shorter_copies(history.database, {"serial": args.serial}, "history")
     if args.compare:
         return _compare_runs(args, runs)
     return _show_trends(args, runs)

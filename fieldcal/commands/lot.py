@@ -60,22 +60,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; 0 if in control, 1 with an odd unit, shift or drift."""
     from fieldcal.calibration import limits
+    from fieldcal.commands.stored_sessions import find_stored_sessions
     from fieldcal.core.errors import InputError
     from fieldcal.fleet.lot import analyse_lot
-    from fieldcal.history import filters, sessions
+    from fieldcal.history import filters
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
-    from fieldcal.history.repeats import copy_sentence, shorter_copies
 
     if not 0 < args.fdr < 1:
         raise InputError(f"--fdr {args.fdr:g}: give a share between 0 and 1")
     wanted = filters.parse_filters(args.query)
     database = Database(args.history or default_location())
-    some = database.run(lambda db: sessions.find_sessions(db, wanted, once=True))
-    if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
-        sys.stderr.write(f"fieldcal lot: {lost}\n")
-    for pair in database.run(lambda db: shorter_copies(db, wanted)):
-        sys.stderr.write(f"fieldcal lot: {copy_sentence(*pair)}\n")
+    some = find_stored_sessions(database, wanted, "lot")
     if not some:
         raise InputError(_why_none(database, wanted))
     found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)

@@ -181,22 +181,16 @@ def _factory_options(args: argparse.Namespace) -> dict[str, float]:
 
 def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
     """Prior from the units of the store that --lot selects, without this unit."""
+    from fieldcal.commands.stored_sessions import find_stored_sessions
     from fieldcal.fleet.lot_prior import estimate_lot_prior
-    from fieldcal.history import filters, sessions
+    from fieldcal.history import filters
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
-    from fieldcal.history.repeats import copy_sentence, shorter_copies
     from fieldcal.session.recorded_part import recorded_part
 
     wanted = filters.parse_filters(args.lot)
     database = Database(args.history or default_location())
-    some = database.run(
-        lambda db: sessions.find_sessions(db, wanted, documents=True, once=True)
-    )
-    if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
-        sys.stderr.write(f"fieldcal solve: {lost}\n")
-    for pair in database.run(lambda db: shorter_copies(db, wanted)):
-        sys.stderr.write(f"fieldcal solve: {copy_sentence(*pair)}\n")
+    some = find_stored_sessions(database, wanted, "solve", documents=True)
     serial = str(session.about.device.get("serial", ""))
     folder = str(session.folder.resolve())
     part = recorded_part(session.folder)

@@ -154,6 +154,7 @@ def test_two_devices_on_one_port_are_said(capsys: pytest.CaptureFixture[str]) ->
         assert main(["ports", "--probe", "--seconds", "0.5", "--json", port]) == 0
         (entry,) = json.loads(capsys.readouterr().out)["ports"]
     says = entry["answer"]["says"]
+    assert entry["answer"]["mixed"] in says
     assert re.search(r"two devices seem to send on one port.*gx by 0\.02 rad/s", says)
     assert "give each a port, names or a frame of its own" in says
     with talking(two_imus(0.0)) as port:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from talking import talking
 
 from fieldcal.cli import main
 from fieldcal.commands import ports, run
@@ -117,6 +118,21 @@ def test_the_one_that_answers_is_taken_and_said(
     said = capsys.readouterr().err
     assert "+z is up" in said and "witmotion at" in said
     assert f'the next time: --device "{args.device}" --mounting=+x,-z,+y' in said
+
+
+def test_two_on_one_port_are_refused_before_anything_is_recorded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(6)
+    rows = np.array([0.1, -0.2, 9.8, 0.01, -0.02, 0.005])
+    rows = rows + np.repeat([0.02, 1e-3], 3) * rng.standard_normal((1000, 6))
+    rows[1::2] += [0.4, 0.3, -0.2, 0.02, -0.01, 0.01]
+    line = b"%.4f,%.4f,%.4f,%.5f,%.5f,%.5f\n"
+    with talking(lambda i: line % tuple(rows[i % 1000])) as port:
+        there = [{"port": port, "what": "", "serial": ""}]
+        monkeypatch.setattr(ports, "serial_ports", lambda: there)
+        with pytest.raises(InputError, match=r"two devices seem.*give each a port"):
+            find_device(options())
 
 
 def test_none_and_too_many_are_questions(

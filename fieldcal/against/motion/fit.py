@@ -18,7 +18,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.evidence.sizing import Member, keys_of
 from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import Alignment, MotionRows
 from fieldcal.model.rows.response import Response
@@ -127,7 +127,7 @@ class MotionFit:
             if step < STAYS and change < STEADY:
                 break
         self.state, self.values = state, values
-        self.settled_keys = frozenset(c.key for c, _ in members)
+        self.settled_keys = keys_of(members)
 
     def _weigh(self, linear: Sequence[LinearRows], values: Array, found: Set) -> None:
         """Set the noise of the rows to that of a fit's residuals."""

@@ -26,7 +26,13 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.gram import Gram, WeightedGram
-from fieldcal.model.evidence.sizing import Member, Sizes, Sizing, instability_log_prior
+from fieldcal.model.evidence.sizing import (
+    Member,
+    Sizes,
+    Sizing,
+    instability_log_prior,
+    keys_of,
+)
 
 SetKey = tuple[tuple[str, int], ...]
 """Key of a set: the keys of its causes with the indices of their variants."""
@@ -53,7 +59,7 @@ class Set:
     @property
     def keys(self) -> frozenset[str]:
         """Keys of its causes."""
-        return frozenset(c.key for c, _ in self.members)
+        return keys_of(self.members)
 
     @property
     def keys_in_state(self) -> frozenset[str]:

@@ -10,7 +10,7 @@ eigenvalues s / (1 - tau^2 s).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -45,6 +45,11 @@ TRIADS = ((0, 1, 2), (3, 4, 5), (6,))
 """Instabilities with similar sizes: those of a triad's axes, and that of closures."""
 
 Member = tuple[Cause, Group]
+
+
+def keys_of(members: Iterable[Member]) -> frozenset[str]:
+    """Keys of the causes of some members."""
+    return frozenset(cause.key for cause, _ in members)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.evidence.sets import Set, SetKey, Sets
-from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.evidence.sizing import Member, keys_of
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportional_offsets import proportional_causes
 from fieldcal.model.search.refinement import Refinement
@@ -237,7 +237,7 @@ def _search_from(search: Search, members: tuple[Member, ...], thorough: bool) ->
     If `thorough`, costly changes are tried once cheap ones find no other causes.
     """
     best = search.run(members, thorough=False)
-    if thorough and best.keys == _causes(members):
+    if thorough and best.keys == keys_of(members):
         return search.run(members)
     return best
 
@@ -251,13 +251,8 @@ def _own_if_no_better(
     has `returned` to a set visited before, it may be the point of the grid next to
     which a time constant was refined.
     """
-    if best.keys != _causes(members):
+    if best.keys != keys_of(members):
         return None
     own = search.sets.evaluate(members, best.sizes)
     rise = TIME_CONSTANT_LOG_LOSS if returned else MIN_LOG_RISE
     return own if best.score <= own.score + rise else None
-
-
-def _causes(members: Sequence[Member]) -> frozenset[str]:
-    """Keys of the causes of some members."""
-    return frozenset(cause.key for cause, _ in members)

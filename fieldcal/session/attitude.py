@@ -22,6 +22,13 @@ from fieldcal.core.positions import Position
 
 ATTITUDE_KEYS = ("alpha_deg", "rotation_vector_deg", "quaternion")
 
+ANGLE_KEYS = ("alpha_deg", "beta_deg", "gamma_deg")
+
+WHOLE_TURN_DEG = 360.0
+
+OTHER_TURNS = {"gon": 400.0, "mrad": 2000 * np.pi, "mil": 6400.0}
+"""A whole turn in other units that angles are written in."""
+
 LENGTH_TOLERANCE = 0.01
 """Difference of a quaternion's length from 1 that is taken for rounding."""
 
@@ -38,7 +45,8 @@ def parse_attitude(number: int, table: Mapping[str, Any], name: str) -> Position
     Raises
     ------
     InputError
-        If it states two attitudes, or something that is no rotation.
+        If it states two attitudes, an angle beyond a whole turn, or something that is
+        no rotation.
 
     """
     given = [form for form in ATTITUDE_KEYS if form in table]
@@ -50,8 +58,7 @@ def parse_attitude(number: int, table: Mapping[str, Any], name: str) -> Position
     if not given:
         position = Position(name or f"position {number}")
     elif given[0] == "alpha_deg":
-        alpha, beta = float(table["alpha_deg"]), float(table["beta_deg"])
-        third = float(table.get("gamma_deg", 0.0))
+        alpha, beta, third = (_angle(number, key, table) for key in ANGLE_KEYS)
         position = Position.deg(alpha, beta, name, gamma=third)
     else:
         turned = _rotation(number, given[0], np.array(table[given[0]], dtype=float))
@@ -67,6 +74,21 @@ def parse_attitude(number: int, table: Mapping[str, Any], name: str) -> Position
             " both, or neither"
         )
     return replace(position, sigma=float(np.deg2rad(sigma)))
+
+
+def _angle(number: int, key: str, table: Mapping[str, Any]) -> float:
+    """An angle, deg; 0 where it is not stated."""
+    angle = float(table.get(key, 0.0))
+    if abs(angle) > WHOLE_TURN_DEG:
+        degrees = [
+            f"{angle * WHOLE_TURN_DEG / turn:.4g}° if it is in {unit}"
+            for unit, turn in OTHER_TURNS.items()
+        ]
+        raise InputError(
+            f"[[position]] number {number} {key} = {angle:g} is more than a whole turn:"
+            f" give it in degrees; it is {', '.join(degrees)}"
+        )
+    return angle
 
 
 def _rotation(number: int, form: str, values: np.ndarray) -> np.ndarray:

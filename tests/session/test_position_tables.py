@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.positions import Position
 from fieldcal.session.description_file import parse_description, with_added_positions
 from fieldcal.session.position_tables import parse_positions, position_table
@@ -71,3 +72,15 @@ def test_an_added_position_keeps_what_is_known_of_it(position: Position) -> None
     (added,) = about.positions
     assert added.oriented == position.oriented
     assert added.all_degrees == position.all_degrees
+
+
+@pytest.mark.parametrize("key", ["alpha_deg", "beta_deg", "gamma_deg"])
+def test_an_angle_beyond_a_whole_turn_is_in_another_unit(key: str) -> None:
+    plain = {"alpha_deg": -360.0, "beta_deg": 360.0, "gamma_deg": 0.0}
+    assert parse_positions([plain])[0][0].oriented
+    with pytest.raises(
+        InputError, match=f"number 2 {key} = -785.398 is more than"
+    ) as e:
+        parse_positions([plain, plain | {key: -785.398}])
+    assert "-45° if it is in mrad" in str(e.value)
+    assert "-706.9° if it is in gon" in str(e.value)

@@ -1,0 +1,167 @@
+"""Whether a hand holds a device, and in which windows.
+
+The gyroscopes show in which windows and about which axes a device trembles: the
+integrated rate has about a straight line the variance
+
+    a^2 + N^2 T / 15                                                               (1)
+
+with a the rms angle of the tremor over T s, and N the density of the white noise, whose
+integral is a random walk. The noise of the sensors is the same in all windows: over a
+second, (1) without a hand varies by a few tenths, and a hand makes it some ten times as
+large. The accelerometers show the slow part of a tremor, in all windows together: in a
+hand the direction of the force varies beyond their noise, on a table it does not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import GYR, Array
+from fieldcal.model.rows.averages import Rows
+from fieldcal.windows.noise import is_to_and_fro, quickest_noise
+
+WANDER_SIGMAS = 6.0
+"""Standard deviations of what the squares across the force have too many."""
+
+MIN_HELD_WINDOWS = 4
+"""Windows of a device in a hand; what lies still for long drifts by itself."""
+
+ACROSS_RATIO = 1.5
+"""And by how much more than along the force."""
+
+MIN_QUIET_SHARE = 0.25
+"""Share of the windows that show no more than the sensors' own noise."""
+
+LYING_NOISE_RATIO = 3.0
+"""Times that noise which one shows in which the device lies still: in published
+recordings 2 at most on a table, 4 to 60 in a hand."""
+
+
+def trembling_windows(
+    rows: Rows, pieces: list[Array], rate: float
+) -> NDArray[np.bool_]:
+    """Windows in which a hand moves the device, while it rests in others, (k,).
+
+    `pieces` are the (n_i, 6) samples of each, nan where missing, at `rate` Hz.
+    """
+    if len(pieces) < MIN_HELD_WINDOWS:
+        return np.zeros(len(pieces), dtype=bool)
+    shown = np.array([_relative_tremor(piece[:, GYR], rate) for piece in pieces])
+    known = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
+    if not known.any():
+        return np.zeros(len(pieces), dtype=bool)
+    sensors = np.quantile(shown[:, known], MIN_QUIET_SHARE, axis=0)
+    apart: NDArray[np.bool_] = (shown[:, known] / sensors).mean(
+        axis=1
+    ) > LYING_NOISE_RATIO
+    return apart
+
+
+def _relative_tremor(rates: Array, rate: float) -> Array:
+    """Variance (1) over a second, relative to that of white noise alone, (3,).
+
+    nan for an axis without noise or without samples.
+    """
+    noise = _high_frequency_noise(rates)
+    measured, unrest = np.isfinite(noise), np.full(3, np.nan)
+    if not measured.any():
+        return unrest
+    many = min(len(rates), max(round(rate), 8))
+    white = noise[measured] ** 2 / rate * (many / rate) / 15
+    parts = np.array_split(rates[:, measured], len(rates) // many)
+    nothing = np.zeros(len(white))
+    turned = [tremor_rms(part, len(part) / rate, nothing) ** 2 for part in parts]
+    # a hand does so all the time, and a bump in a second or two
+    usual = np.median(turned, axis=0)
+    unrest[measured] = usual / np.where(white > 0, white, np.nan)
+    return unrest
+
+
+def _high_frequency_noise(rates: Array) -> Array:
+    """Standard deviation of the high-frequency noise of one sample, (3,).
+
+    nan for an axis without samples.
+    """
+    out = np.full(3, np.nan)
+    measured = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
+    if measured.any():
+        out[measured] = quickest_noise([rates[:, measured]])
+    return out
+
+
+def noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | None:
+    """Noise of one sample without the tremor, (6,); None if there is no tremor.
+
+    `pieces` are the (n_i, 6) samples of windows, `least` (6,) the noise of rounding.
+    """
+    free = ~rows.x.oriented.any() and len(pieces) >= MIN_HELD_WINDOWS
+    if not free or not is_to_and_fro([piece[:, GYR] for piece in pieces]):
+        return None
+    # where a hand is quick, differences of samples show it as well
+    each = np.ma.masked_invalid(
+        [_high_frequency_noise(piece[:, GYR]) for piece in pieces]
+    )
+    loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
+    quiet = np.argsort(loud)[: max(round(MIN_QUIET_SHARE * len(pieces)), 1)]
+    beside: Array = np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
+    return beside
+
+
+def tremor_rms(values: Array, length: float, white: Array) -> Array:
+    """Rms of the integrated outputs, an angle or a speed, about a line, (k,).
+
+    Parameters
+    ----------
+    values : (n, k) outputs, nan where missing
+    length : T, s
+    white : (k,) deviation of the mean by white noise, N / sqrt(T)
+
+    """
+    known = np.isfinite(values)
+    mean = np.nan_to_num(values).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    off = np.where(known, values - mean, 0.0)
+    total = np.cumsum(off, axis=0) * (length / len(off))
+    part = np.linspace(-1.0, 1.0, len(off))
+    line = np.linalg.qr(np.column_stack([np.ones_like(part), part]))[0]
+    total -= line @ (line.T @ total)
+    noise = (white * length) ** 2 / 15
+    out: Array = np.sqrt(np.maximum((total**2).mean(axis=0) - noise, 0.0))  # (1)
+    return out
+
+
+def force_wander_angle(rows: Rows) -> float:
+    """Rms angle by which the force turns within windows, rad; 0 on a table.
+
+    A course that all windows share is subtracted: outputs that settle make one.
+    """
+    x, usable = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
+    held = [usable & (x.position == p) for p in np.unique(x.position[usable])]
+    held = [at for at in held if at.sum() > 1]
+    if len(held) < MIN_HELD_WINDOWS:
+        return 0.0
+    offs = [rows.y[at, :3] - rows.y[at, :3].mean(axis=0) for at in held]
+    along, across, dof, angle = 0.0, 0.0, 0.0, []
+    for at, off in zip(held, _without_shared_course(offs), strict=True):
+        up = x.f[at][0] / np.linalg.norm(x.f[at][0])
+        sd = rows.sd[at, :3]
+        part = np.outer(off @ up, up)
+        free = (len(off) - 1) * (1 - 1 / len(held))
+        along += float(((part / sd) ** 2).sum())
+        across += float((((off - part) / sd) ** 2).sum())
+        dof += free
+        length = np.linalg.norm(rows.y[at, :3].mean(axis=0))
+        angle.append(((off - part) ** 2).sum() / (2 * free) / length**2)
+    if across / 2 < max(dof + WANDER_SIGMAS * np.sqrt(dof), ACROSS_RATIO * along):
+        return 0.0
+    return float(np.sqrt(np.mean(angle)))
+
+
+def _without_shared_course(offs: list[Array]) -> list[Array]:
+    """Courses within windows, (n, 3) each, less their median course."""
+    longest = max(map(len, offs))
+    whole = np.full((len(offs), longest, 3), np.nan)
+    for i, off in enumerate(offs):
+        whole[i, : len(off)] = off
+    shared = np.nanmedian(whole, axis=0)
+    return [off - shared[: len(off)] for off in offs]

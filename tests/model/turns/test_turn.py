@@ -247,6 +247,20 @@ def test_a_filter_is_what_its_columns_foretell(acc: float, gyr: float) -> None:
         assert seen > 25 and rest < 0.02 * seen + 1.4 * np.sqrt(len(turn.way))
 
 
+def test_the_way_agrees_where_the_state_lacks_what_the_factory_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beside what the factory left, bias and scale factor are others than without."""
+    monkeypatch.setattr(sys.modules[__name__], "PLACES", ((0.0, 0.0), (45.0, 5.0)))
+    left = {"k31": 2e-3, "k12": -1e-3, "k23": 2e-3}
+    fit, _, _ = followed(*recorded(checked_effect("cross_coupling", left)))
+    state, values, best = fit.settle(fit.nominal, np.zeros(fit.dictionary.width), ())
+    assert fit.turns is not None and not best.members
+    linear = fit.system.linearised(state)
+    (turn,) = fit.turns.linearised(state, values, linear, best)
+    assert len(turn.way) > 50 and turn.way @ turn.way < 1.5 * len(turn.way)
+
+
 def test_two_terms_of_one_effect_are_told_apart() -> None:
     """A step of both triads is two terms; what one puts on the way is not the other."""
     one = ride("gyro_scale")

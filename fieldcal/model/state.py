@@ -21,9 +21,9 @@ from fieldcal.physics.experience import Experience
 from fieldcal.physics.lag import Lag
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Term:
-    """An effect with its parameters.
+    """An effect with its parameters; the same only as itself.
 
     Attributes
     ----------

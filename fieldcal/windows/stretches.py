@@ -22,7 +22,7 @@ from fieldcal.windows.dead_axis import LiveAxisRows
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.rests import SPREAD_CELLS, cell_table, find_rest_runs
 from fieldcal.windows.spikes import without_spikes
-from fieldcal.windows.verdict import judge_window
+from fieldcal.windows.verdict import FEWEST_JUDGED_CELLS, judge_window
 
 MIN_STRETCHES = 3
 """Number of stretches below which the rests may be too short to omit half a second at
@@ -30,6 +30,9 @@ each end."""
 
 SEAM_S = 2 * CELL
 """Largest gap between two parts of one rest that are evaluated separately, s."""
+
+TESTED_S = FEWEST_JUDGED_CELLS * CELL + CELL
+"""Least time after a step that is a stretch of its own, s: long enough to be tested."""
 
 _CLEARLY = 0.98
 """Largest ratio of departure to the allowed one for a pass without reading samples."""
@@ -201,8 +204,11 @@ def _passing_parts(
     worst = judge_window(sums.table, StillnessLimits()).worst
     if worst.ratio <= 1:
         return [(first, float(np.nextafter(last, np.inf)))]
+    over = worst.at + worst.seconds
+    if worst.kind == "step" and last - worst.at > TESTED_S:
+        over = worst.at + CELL  # its seconds are those of the means that show it
     # at an end of the stretch the last or the first sample is removed
-    after = max(worst.at + worst.seconds, first + CELL)
+    after = max(over, first + CELL)
     return [
         *_passing_parts(between, start, min(worst.at, last), shortest),
         *_passing_parts(between, max(after, start), end, shortest),

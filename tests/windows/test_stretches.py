@@ -220,6 +220,21 @@ def test_every_stretch_passes_as_a_window_and_is_as_long_as_asked(long: Block) -
     assert still_stretches(long, -5.0) == still_stretches(long, 1.0)
 
 
+@pytest.mark.parametrize(("rest_s", "kept"), [(8.0, True), (2.0, False)])
+def test_what_lies_after_a_jump_of_an_output_is_kept(rest_s: float, kept: bool) -> None:
+    """If it lasts long enough to be tested: a jump is over as soon as it is there."""
+    rng, before, rate = np.random.default_rng(5), 8.0, 100
+    length = int((before + rest_s) * rate)
+    acc = [0, 0, 9.81] + rng.normal(0, 4e-3, (length, 3))
+    acc[int(before * rate) :, 2] += 5.5e-3
+    found = still_stretches(Block.of(np.arange(length) / rate, acc), 1.0)
+    assert found[0][1] == pytest.approx(before, abs=0.15)
+    assert len(found) == 1 + kept
+    if kept:
+        assert found[1][0] == pytest.approx(before, abs=0.3)
+        assert found[1][1] == pytest.approx(before + rest_s, abs=0.8)
+
+
 def test_a_push_cuts_a_rest_in_two() -> None:
     rng = np.random.default_rng(3)
     acc = [0, 0, 9.81] + rng.normal(0, 0.03, (6000, 3))

@@ -67,10 +67,8 @@ class TurnForceRows:
         off = turn.acc - turn.means(output[:, :3])
         z = off.ravel() + flat[:, own] @ values[columns[own]]
         held, at = self._window_columns(columns, flat)
-        estimate = np.where(
-            values[posterior.columns[at]] != 0, 0.0, posterior.estimate[at]
-        )
-        z = z - held @ estimate
+        # the state may lack what windows say, as it does of what the factory left
+        z = z - held @ (posterior.estimate - self._in_state(values))[at]
         cov = self._covariance()
         cov += held @ posterior.inverse[np.ix_(at, at)] @ held.T
         sd = self.turn.sd.ravel()
@@ -80,6 +78,16 @@ class TurnForceRows:
         place = order[np.searchsorted(index[order], columns[own])]
         whole[:, place] = whiten @ flat[:, own]
         return whiten @ z, whole
+
+    def _in_state(self, values: Array) -> Array:
+        """Values in the state of the columns of the windows' set, (a,).
+
+        A column of two groups has a part of its value in each.
+        """
+        columns = self.known.state.columns
+        count = np.bincount(columns, minlength=len(values))
+        out: Array = (values / np.maximum(count, 1))[columns]
+        return out
 
     def _output_means(self, outputs: Array) -> Array:
         """Means over the pieces, by outputs at their edges, (k, 3, columns), (2)."""

@@ -247,6 +247,38 @@ def test_a_filter_is_what_its_columns_foretell(acc: float, gyr: float) -> None:
         assert seen > 25 and rest < 0.02 * seen + 1.4 * np.sqrt(len(turn.way))
 
 
+def test_the_way_agrees_where_the_state_lacks_what_the_factory_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beside what the factory left, bias and scale factor are others than without."""
+    monkeypatch.setattr(sys.modules[__name__], "PLACES", ((0.0, 0.0), (45.0, 5.0)))
+    left = {"k31": 2e-3, "k12": -1e-3, "k23": 2e-3}
+    fit, _, _ = followed(*recorded(checked_effect("cross_coupling", left)))
+    state, values, best = fit.settle(fit.nominal, np.zeros(fit.dictionary.width), ())
+    assert fit.turns is not None and not best.members
+    linear = fit.system.linearised(state)
+    (turn,) = fit.turns.linearised(state, values, linear, best)
+    assert len(turn.way) > 50 and turn.way @ turn.way < 1.5 * len(turn.way)
+
+
+def test_two_terms_of_one_effect_are_told_apart() -> None:
+    """A step of both triads is two terms; what one puts on the way is not the other."""
+    one = ride("gyro_scale")
+    fit, effect = one.fit, one.group.effect
+    assert effect is not None and fit.turns is not None
+    terms = (Term(effect, np.full(3, 2e-3)), Term(effect, np.full(3, 1e-3)))
+    state = replace(fit.nominal, terms=terms)
+    turns = fit.turns_at(state)
+    both, first, second = (
+        list(fit.turns.outputs_of_terms(turns, state, some))
+        for some in (terms, terms[:1], terms[1:])
+    )
+    for whole, larger, smaller in zip(both, first, second, strict=True):
+        np.testing.assert_allclose(larger, 2 * smaller, rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(whole, larger + smaller, rtol=1e-9, atol=1e-15)
+        assert np.abs(smaller).max() > 1e-5
+
+
 def test_what_an_arm_puts_on_the_way_is_what_turns_make_of_it() -> None:
     """w x (w x r) + w' x r, and of the other causes of a state nothing."""
     one, arm = ride("lever_arm"), np.array([0.02, -0.01, 0.03])

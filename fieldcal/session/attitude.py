@@ -24,7 +24,8 @@ ATTITUDE_KEYS = ("alpha_deg", "rotation_vector_deg", "quaternion")
 
 ANGLE_KEYS = ("alpha_deg", "beta_deg", "gamma_deg")
 
-WHOLE_TURN_DEG = 360.0
+WHOLE_TURN_DEG, MAX_TURNS = 360.0, 2
+"""And the largest number of turns that an angle is: joints count on beyond one."""
 
 OTHER_TURNS = {"gon": 400.0, "mrad": 2000 * np.pi, "mil": 6400.0}
 """A whole turn in other units that angles are written in."""
@@ -45,7 +46,7 @@ def parse_attitude(number: int, table: Mapping[str, Any], name: str) -> Position
     Raises
     ------
     InputError
-        If it states two attitudes, an angle beyond a whole turn, or something that is
+        If it states two attitudes, an angle beyond two turns, or something that is
         no rotation.
 
     """
@@ -79,13 +80,13 @@ def parse_attitude(number: int, table: Mapping[str, Any], name: str) -> Position
 def _angle(number: int, key: str, table: Mapping[str, Any]) -> float:
     """An angle, deg; 0 where it is not stated."""
     angle = float(table.get(key, 0.0))
-    if abs(angle) > WHOLE_TURN_DEG:
+    if abs(angle) > MAX_TURNS * WHOLE_TURN_DEG:
         degrees = [
             f"{angle * WHOLE_TURN_DEG / turn:.4g}° if it is in {unit}"
             for unit, turn in OTHER_TURNS.items()
         ]
         raise InputError(
-            f"[[position]] number {number} {key} = {angle:g} is more than a whole turn:"
+            f"[[position]] number {number} {key} = {angle:g} is more than two turns:"
             f" give it in degrees; it is {', '.join(degrees)}"
         )
     return angle

@@ -14,7 +14,7 @@ from fieldcal.core.positions import Position
 from fieldcal.session.attitude import parse_attitude
 from fieldcal.session.description_file import parse_description
 
-ANGLE = st.floats(-360, 360)
+ANGLE = st.floats(-400, 400)
 UNIT = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(v * v for v in q) > 0.1)
 
 

@@ -75,11 +75,11 @@ def test_an_added_position_keeps_what_is_known_of_it(position: Position) -> None
 
 
 @pytest.mark.parametrize("key", ["alpha_deg", "beta_deg", "gamma_deg"])
-def test_an_angle_beyond_a_whole_turn_is_in_another_unit(key: str) -> None:
-    plain = {"alpha_deg": -360.0, "beta_deg": 360.0, "gamma_deg": 0.0}
+def test_an_angle_beyond_two_turns_is_in_another_unit(key: str) -> None:
+    plain = {"alpha_deg": -720.0, "beta_deg": 720.0, "gamma_deg": 0.0}
     assert parse_positions([plain])[0][0].oriented
     with pytest.raises(InputError) as refused:
         parse_positions([plain, plain | {key: -785.398}])
     said = str(refused.value)
-    assert f"number 2 {key} = -785.398 is more than a whole turn" in said
+    assert f"number 2 {key} = -785.398 is more than two turns" in said
     assert "-45° if it is in mrad" in said and "-706.9° if it is in gon" in said

@@ -1,4 +1,9 @@
-"""Differences in the noise of samples."""
+"""Differences in the noise of samples.
+
+An output that lies on a grid of step q scatters by q^2 / 12 more, as a variance, in the
+mean over where the output lies between two steps, and by about half of that more or
+less, as it lies. Where most of the scatter is of that kind, the noise is not told.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +14,16 @@ import numpy as np
 from fieldcal.against.joint import probability_of_difference
 from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.against.side import DiagnosedRecording
-from fieldcal.core.samples import CHANNELS
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import thresholds
 
 NOISE_LOG_SPREAD = 0.5
 """Typical difference of the noise of two devices, ln."""
+
+MIN_TOLD_SHARE = 0.25
+"""Share of the variance below which what rounding leaves of it tells no noise."""
 
 NO_NOISE_RATIO = 1e-3
 """Noise, relative to the other recording's, that counts as none."""
@@ -31,21 +39,33 @@ def noise_differences(
     real: DiagnosedRecording, sim: DiagnosedRecording
 ) -> Iterator[Difference]:
     """Differences in the noise of each triad."""
-    for part in (slice(0, 3), slice(3, 6)):
-        seen = np.isfinite(real.noise[part]) & np.isfinite(sim.noise[part])
-        at = np.flatnonzero(seen & (real.noise[part] > 0)) + part.start
-        if len(at):
-            yield from _triad_noise_difference(real, sim, at.tolist())
+    one, two = _noise_alone(real)[0], _noise_alone(sim)[0]
+    told = np.flatnonzero((one > 0) & np.isfinite(two))
+    for triad in ((0, 1, 2), (3, 4, 5)):
+        if at := [c for c in told.tolist() if c in triad]:
+            yield from _triad_noise_difference(real, sim, at)
+
+
+def _noise_alone(side: DiagnosedRecording) -> tuple[Array, Array]:
+    """Noise of each channel without rounding, (6,), and the sigma of its logarithm.
+
+    nan where rounding hides it.
+    """
+    variance = side.noise**2 - side.steps**2 / 12
+    told = (variance >= MIN_TOLD_SHARE * side.noise**2) | (side.noise == 0)
+    level = np.sqrt(np.where(told, np.maximum(variance, 0.0), np.nan))
+    rounding = np.zeros(6)
+    np.divide(side.steps**2 / 24, level**2, out=rounding, where=level > 0)
+    return level, np.hypot(side.noise_uncertainty, rounding)
 
 
 def _triad_noise_difference(
     real: DiagnosedRecording, sim: DiagnosedRecording, at: Sequence[int]
 ) -> Iterator[Difference]:
     """Difference of one triad, by the logarithms of its noise levels."""
-    one = real.noise[at]
-    two = np.maximum(sim.noise[at], NO_NOISE_RATIO * one)
-    off = np.log(one / two)
-    sigma = np.hypot(real.noise_uncertainty[at], sim.noise_uncertainty[at])
+    (one, unsure), (two, other_unsure) = _noise_alone(real), _noise_alone(sim)
+    one, two = one[at], np.maximum(two[at], NO_NOISE_RATIO * one[at])
+    off, sigma = np.log(one / two), np.hypot(unsure[at], other_unsure[at])
     probability = probability_of_difference(
         off, np.diag(sigma**2), np.full(len(at), NOISE_LOG_SPREAD)
     )

@@ -2,7 +2,7 @@
 
 An output that lies on a grid of step q scatters by q^2 / 12 more, as a variance, in the
 mean over where the output lies between two steps, and by about half of that more or
-less, as it lies. Where most of the scatter is of that kind, the noise is not told.
+less, as it lies. Where the scatter is no larger than that, the noise is not told.
 """
 
 from __future__ import annotations
@@ -21,9 +21,6 @@ from fieldcal.model import thresholds
 
 NOISE_LOG_SPREAD = 0.5
 """Typical difference of the noise of two devices, ln."""
-
-MIN_TOLD_SHARE = 0.25
-"""Share of the variance below which what rounding leaves of it tells no noise."""
 
 NO_NOISE_RATIO = 1e-3
 """Noise, relative to the other recording's, that counts as none."""
@@ -52,7 +49,7 @@ def _noise_alone(side: DiagnosedRecording) -> tuple[Array, Array]:
     nan where rounding hides it.
     """
     variance = side.noise**2 - side.steps**2 / 12
-    told = (variance >= MIN_TOLD_SHARE * side.noise**2) | (side.noise == 0)
+    told = (variance > 0) | (side.noise == 0)
     level = np.sqrt(np.where(told, np.maximum(variance, 0.0), np.nan))
     rounding = np.zeros(6)
     np.divide(side.steps**2 / 24, level**2, out=rounding, where=level > 0)

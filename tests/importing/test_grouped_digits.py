@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from joined import read_files
 from laid_about import G, turned
 
+from fieldcal.core.samples import Block
 from fieldcal.importing.text.grouped_digits import SIGNS, GroupedDigits
 
 ROWS = turned(12, 50.0, 2.0)
@@ -24,16 +25,20 @@ def shown(number: int, sign: str) -> str:
     return f"{number:,}".replace(",", sign)
 
 
-def import_of(folder: Path, rows: list[list[str]], separator: str) -> None:
+def imported(
+    folder: Path, rows: list[list[str]], separator: str
+) -> tuple[Block, list[str]]:
     path = folder / "log.csv"
     head = separator.join(["t_ms", "ax", "ay", "az", "gx", "gy", "gz"])
     text = "\n".join([head, *(separator.join(row) for row in rows)])
     path.write_text(text + "\n", encoding="utf-8")
-    block, says = read_files([path])
+    return read_files([path])
+
+
+def assert_is_motion(block: Block) -> None:
     np.testing.assert_allclose(block.t - block.t[0], ROWS[:, 0], atol=1e-3)
     np.testing.assert_allclose(block.acc, ROWS[:, 1:4], atol=1e-3)
     np.testing.assert_allclose(block.gyr, ROWS[:, 4:], atol=1e-3)
-    assert [one for one in says if "between thousands" in one]
 
 
 @pytest.mark.parametrize("sign", SIGNS)
@@ -43,7 +48,9 @@ def test_counts_of_a_spreadsheet_are_whole_numbers(tmp_path: Path, sign: str) ->
     if sign == ",":
         # in quotes, as a comma parts the columns
         rows = [[f'"{cell}"' if sign in cell else cell for cell in row] for row in rows]
-    import_of(tmp_path, rows, "," if sign == "," else ";")
+    block, says = imported(tmp_path, rows, "," if sign == "," else ";")
+    assert_is_motion(block)
+    assert [one for one in says if "between thousands" in one]
 
 
 @given(st.lists(st.integers(-(10**10), 10**10), min_size=8), st.sampled_from(SIGNS))

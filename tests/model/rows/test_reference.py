@@ -165,3 +165,13 @@ def test_channels_sampled_at_other_instants_are_each_followed_by_their_own() -> 
     expected = waves(INSIDE, np.arctan(W * 0.02) / W, np.hypot(1, W * 0.02) ** -1)
     expected[:, 1] = 0.0
     np.testing.assert_allclose(followed(0.02, found).at(INSIDE), expected, atol=3e-4)
+
+
+def test_slopes_are_those_of_the_channels_that_are_asked_for() -> None:
+    whole = Response.of(REFERENCE, 0.0, 0.02, 0.03)
+    own = whole.step_towards(REFERENCE, 0.0, 0.02, 0.03, False, range(3))
+    for some, every in ((own.slope, whole.slope), (own.bend, whole.bend)):
+        found, expected = some.at(INSIDE), every.at(INSIDE)
+        np.testing.assert_array_equal(found[:, :3], expected[:, :3])
+        assert not found[:, 3:].any() and expected[:, 3:].any()
+    np.testing.assert_array_equal(own.sensed.at(INSIDE), whole.sensed.at(INSIDE))

@@ -23,6 +23,7 @@ from benchmarks.concealed import Draw, draws, kinds
 from benchmarks.concealed.judging import AS_WELL
 from benchmarks.concealed.sessions import Session
 from fieldcal.against import Match, compare
+from fieldcal.against.wording import is_direction_open
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain
 
@@ -41,6 +42,7 @@ class Outcome:
     ----------
     relation, name : what was drawn
     named, aliased, directed : whether that is said, by an alias only, of the right one
+    open : whether it is said that the direction is not certain
     false : whether anything is said that is not so
     before, after : chi^2 a degree of freedom of what is predicted
     seconds : of processor time
@@ -52,6 +54,7 @@ class Outcome:
     named: bool
     aliased: bool
     directed: bool
+    open: bool
     false: bool
     before: float
     after: float
@@ -99,6 +102,7 @@ def judged(relation: str, name: str, found: Match, seconds: float) -> Outcome:
         else not found.differences,
         bool(said) and all(d.id != name for d in said),
         any(d.direction == relation for d in said),
+        any(map(is_direction_open, said)),
         bool(more) or relation == "equal" and bool(said),
         found.before.chi2_per_dof,
         found.after.chi2_per_dof,
@@ -122,7 +126,8 @@ def outcomes(count: int, first: int) -> Iterator[Outcome]:
         one = judged(relation, name, found, time.process_time() - start)
         done += 1
         heard = one.named or one.aliased
-        if one.false or not heard or relation != "equal" and not one.directed:
+        wrong = relation != "equal" and not (one.directed or one.open)
+        if one.false or not heard or wrong:
             told = [(d.id, d.direction, d.aliases) for d in found.differences]
             print(f"{relation} {name} (seed {seed}): {told}", flush=True)
         yield one
@@ -130,23 +135,25 @@ def outcomes(count: int, first: int) -> Iterator[Outcome]:
 
 def printed(found: Sequence[Outcome]) -> None:
     """Print a row for each relation."""
-    print("| drawn | pairs | named right | or by an alias | direction right |"
-          " something false | χ²/dof before | after | s |")  # fmt: skip
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("| drawn | pairs | named right | or by an alias | direction right, if told |"
+          " not told | something false | χ²/dof before | after | s |")  # fmt: skip
+    print("|---|---|---|---|---|---|---|---|---|---|")
     for relation in RELATIONS:
         some = [o for o in found if o.relation == relation]
         if not some:
             continue
         heard = [o for o in some if o.named or o.aliased]
+        told = [o for o in heard if not o.open]
         shares = [
             np.mean([o.named for o in some]),
             np.mean([o.named or o.aliased for o in some]),
-            np.mean([o.directed for o in heard]) if heard else np.nan,
+            np.mean([o.directed for o in told]) if told else np.nan,
+            np.mean([o.open for o in heard]) if heard else np.nan,
             np.mean([o.false for o in some]),
         ]
         cells = [f"{100 * share:.1f} %" for share in shares]
         if relation == "equal":
-            cells[1] = cells[2] = "–"
+            cells[1:4] = ["–"] * 3
         numbers = [
             np.median([getattr(o, n) for o in some]) for n in ("before", "after")
         ]

@@ -7,6 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.against.calibrations import sides_of_device
+from fieldcal.against.cause_values import (
+    cause_quantities,
+    quantities_at_size,
+    size_of_cause,
+)
 from fieldcal.against.joint import (
     Relation,
     evidence_of_proportional,
@@ -16,23 +22,42 @@ from fieldcal.against.joint import (
     probability_of_differing,
     relation_probabilities,
 )
+from fieldcal.against.one_device import evidence_of_one_device
 from fieldcal.against.pairing import CausePairing
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet, with_all_parameters
-from fieldcal.core.samples import Array
-from fieldcal.diagnosis.findings import found_effects, mismatches, random_sizes
-from fieldcal.diagnosis.result import Mismatch, Quantity
+from fieldcal.diagnosis.findings import found_effects, mismatches
+from fieldcal.diagnosis.result import Mismatch
 from fieldcal.effects import catalogue
-from fieldcal.model import priors, thresholds
-from fieldcal.model.causes.cause import Group
+from fieldcal.model import thresholds
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.size_average import average_over_sizes
-from fieldcal.physics.effect import CHANCE, Motion, Scatter, Sensor
 
 DIRECTION: dict[Relation, Direction] = {
     "real": "left_out", "simulator": "added", "other": "resized",
 }  # fmt: skip
+
+EQUAL: tuple[Relation, ...] = ("same", "neither")
+"""Relations of two sessions that do not differ."""
+
+
+@dataclass(frozen=True, slots=True)
+class DecidedRelation:
+    """The likeliest relation of two sessions in one cause.
+
+    Attributes
+    ----------
+    name : of the relation
+    differs : probability that they differ in it
+    either : probability that they differ in it, or in what a calibration has like it
+    who : probability of `name` among the relations in which they differ
+
+    """
+
+    name: Relation
+    differs: float
+    either: float
+    who: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -42,14 +67,13 @@ class DecidedCauses:
     Attributes
     ----------
     pairing : both sessions, with the causes of either
-    relations : relation of the sessions by the key of a cause, with the probability
-        that they differ in it
+    relations : of the sessions, by the key of a cause
     real, sim : each session with the causes that it has
 
     """
 
     pairing: CausePairing
-    relations: dict[str, tuple[Relation, float]]
+    relations: dict[str, DecidedRelation]
     real: WidenedSet
     sim: WidenedSet
 
@@ -64,7 +88,7 @@ def decide_causes(pairing: CausePairing) -> DecidedCauses:
     relations = {key: _relation(pairing, key) for key in pairing.keys}
     real, sim = pairing.widened
     ours, theirs = (
-        [k for k, (r, _) in relations.items() if r not in (alone, "neither")]
+        [k for k, r in relations.items() if r.name not in (alone, "neither")]
         for alone in ("simulator", "real")
     )
     return DecidedCauses(
@@ -72,14 +96,46 @@ def decide_causes(pairing: CausePairing) -> DecidedCauses:
     )
 
 
-def _relation(pairing: CausePairing, key: str) -> tuple[Relation, float]:
-    """The likeliest relation in one cause, and the probability of a difference."""
+def _relation(pairing: CausePairing, key: str) -> DecidedRelation:
+    """The likeliest relation in one cause."""
     real, sim = pairing.widened
-    one, two = real.effect_information(key), sim.effect_information(key)
     member = real.member(key) or sim.member(key)
+    if member is None:
+        raise KeyError(key)
+    random = member[0].kind in ("random", "unknown")
+    sides = sides_of_device(real, sim, key)
+    of_one = evidence_of_one_device(*sides, random)
+    found = relation_probabilities(
+        real.effect_information(key),
+        sim.effect_information(key),
+        member[0].chance,
+        *_evidence_of_alike_and_scaled(pairing, key, random),
+        of_one,
+    )
+    differ = probability_of_differing(found)
+    either = differ
+    if _calibration_like(member):
+        equal = evidence_of_one_device(*sides, random, differs=0.0)
+        either = 1 - sum(
+            found.get(n, 0.0) * float(np.exp(equal[n] - of_one[n]))
+            for n in EQUAL
+            if n in of_one
+        )
+    if differ < thresholds.NAMED:
+        name = max(EQUAL, key=lambda n: found.get(n, 0.0))
+        return DecidedRelation(name, differ, either)
+    name = likeliest_difference(found)
+    return DecidedRelation(name, differ, either, found[name] / differ)
+
+
+def _evidence_of_alike_and_scaled(
+    pairing: CausePairing, key: str, random: bool
+) -> tuple[float | None, float | None]:
+    """Ln evidence of the same cause in both, and of proportional ones; None if open."""
+    one, two = (w.effect_information(key) for w in pairing.widened)
     alike = scaled = None
-    if one and two and member:
-        if member[0].kind in ("random", "unknown"):
+    if one and two:
+        if random:
             alike = evidence_of_same_size(one, two)
         else:
             scaled = evidence_of_proportional(one, two)
@@ -90,40 +146,49 @@ def _relation(pairing: CausePairing, key: str) -> tuple[Relation, float]:
         alike = max(
             evidence_of_same(a, b) for a, b in told if a is not None and b is not None
         )
-    chance = member[0].chance if member is not None else CHANCE
-    found = relation_probabilities(one, two, chance, alike, scaled)
-    differ = probability_of_differing(found)
-    if differ < thresholds.NAMED:
-        none: list[Relation] = ["same", "neither"]
-        return max(none, key=lambda n: found.get(n, 0.0)), differ
-    return likeliest_difference(found), differ
+    return alike, scaled
+
+
+def _calibration_like(member: Member) -> str:
+    """Group of the calibration that changes as a cause would change it; or none."""
+    effect = member[1].effect
+    return "" if effect is None else effect.like_calibration
 
 
 def _with_causes(there: WidenedSet, keys: Sequence[str]) -> WidenedSet:
     """A session with some of its causes only, and its estimates with these."""
     some = tuple(m for m in there.set.members if m[0].key in keys)
     kept = tuple(map(with_all_parameters, some))
-    found = there.sets.evaluate(kept, there.set.sizes_of(some))
-    return replace(there, set=found, reported_set=average_over_sizes(there.sets, found))
+    return there.having(there.sets.evaluate(kept, there.set.sizes_of(some)))
 
 
 def differences(found: DecidedCauses) -> Iterator[Difference]:
     """Differences, one for each name and direction; triads are combined."""
     parts: dict[tuple[str, Direction], list[str]] = {}
-    for key, (relation, probability) in found.relations.items():
-        if relation in DIRECTION and probability >= thresholds.NAMED:
-            member = _member(found, key)
-            parts.setdefault((member[0].name, DIRECTION[relation]), []).append(key)
+    for key, relation in found.relations.items():
+        if relation.name in DIRECTION and relation.differs >= thresholds.NAMED:
+            name = _member(found, key)[0].name
+            parts.setdefault((name, DIRECTION[relation.name]), []).append(key)
     for (name, direction), keys in parts.items():
         yield _difference(found, name, direction, keys)
+
+
+def instead_of_calibration(found: DecidedCauses, group: str) -> tuple[str, ...]:
+    """Causes that may differ instead of a group of the calibration."""
+    return tuple(
+        member[0].name
+        for key, relation in found.relations.items()
+        if _calibration_like(member := _member(found, key)) == group
+        and 1 - thresholds.DIFFERS < relation.differs < thresholds.NAMED
+    )
 
 
 def shared_causes(found: DecidedCauses) -> tuple[str, ...]:
     """Names of the causes that both have with the same size."""
     names = [
         _member(found, k)[0].name
-        for k, (r, _) in found.relations.items()
-        if r == "same"
+        for k, relation in found.relations.items()
+        if relation.name == "same"
     ]
     return tuple(dict.fromkeys(names))
 
@@ -149,12 +214,18 @@ def _difference(
             found.real.member(key), found.sim.member(key), found
         )
     told = [other.effect_information(key) for key in keys]
+    decided = [found.relations[key] for key in keys]
+    aliases = aliases_of(name, _having(pairing, direction), pairing.instead)
+    if max(d.differs for d in decided) < thresholds.DIFFERS:
+        like = (_calibration_like(_member(found, key)) for key in keys)
+        aliases += tuple(dict.fromkeys(filter(None, like)))
     return Difference(
         id=name,
         direction=direction,
-        probability=max(found.relations[k][1] for k in keys),
+        probability=max(d.either for d in decided),
+        direction_probability=max(d.who for d in decided),
         parameters=parameters,
-        aliases=aliases_of(name, _having(pairing, direction), pairing.instead),
+        aliases=aliases,
         where=_mismatches_of_cause(source, pairing.instead.get(name, name)),
         shown=any(t is not None and t.shows for t in told),
         explained=name in catalogue(),
@@ -172,78 +243,16 @@ def _parameter_pairs(
     real = cause_quantities(found.real, one) if one else {}
     sim = cause_quantities(found.sim, two) if two else {}
     if one and two:
-        ours, theirs = _size_of(found.real, one), _size_of(found.sim, two)
+        ours, theirs = size_of_cause(found.real, one), size_of_cause(found.sim, two)
         if ours < theirs:
-            real |= _quantities_at_size(found.real, one, theirs)
+            real |= quantities_at_size(found.real, one, theirs)
         elif theirs < ours:
-            sim |= _quantities_at_size(found.sim, two, ours)
+            sim |= quantities_at_size(found.sim, two, ours)
     return {
         name: RealAndSimulated.of(real.get(name), sim.get(name))
         for name in dict.fromkeys([*real, *sim])
         if (one is None or name in real) and (two is None or name in sim)
     }
-
-
-def _quantities_at_size(
-    there: WidenedSet, member: Member, size: float
-) -> dict[str, Quantity]:
-    """Parameters of a cause with an equation, given `size` in units of typical."""
-    group, told = member[1], there.effect_information(member[0].key)
-    if told is None or not isinstance(group.effect, Motion | Sensor):
-        return {}
-    before = size * group.typical
-    known = np.linalg.inv(told.inner + np.eye(len(told.rhs)) / size**2)
-    covariance = known * np.outer(group.typical, group.typical)
-    values = group.typical * (known @ told.rhs)
-    return _determined_parameters(there, group, values, covariance, before)
-
-
-def _determined_parameters(
-    there: WidenedSet, group: Group, values: Array, covariance: Array, before: Array
-) -> dict[str, Quantity]:
-    """Parameters (k,) of an effect that the rows determine.
-
-    That is: their variance is clearly less than that of the prior, `before` (k,).
-    """
-    effect, sigma = group.effect, np.sqrt(np.diag(covariance))
-    if effect is None:
-        return {}
-    params = [effect.params[j] for j in group.params]
-    out = {
-        p.name: Quantity(float(v), float(s), p.unit)
-        for p, v, s, b in zip(params, values, sigma, before, strict=True)
-        if s**2 < thresholds.DETERMINED * b**2
-    }
-    if there.fit.dictionary.unoriented.all():
-        out = found_effects.merge_turned_parameters(
-            group, values, covariance, before, out
-        )
-    return out
-
-
-def cause_quantities(there: WidenedSet, member: Member) -> dict[str, Quantity]:
-    """Parameters of a cause that the rows determine."""
-    group = member[1]
-    if group.effect is None:
-        return {}
-    if isinstance(group.effect, Scatter):
-        d = there.fit.dictionary
-        return random_sizes.random_sizes_of_group(
-            there.set, d, group, _size_of(there, member)
-        )
-    values, covariance = there.estimate(group.columns)
-    before = group.prior_sigma(_size_of(there, member))
-    out = _determined_parameters(there, group, values, covariance, before)
-    for shape in group.effect.shapes:
-        at = group.shape[shape.name]
-        unsure = min(group.shape_sigma, at) if np.isfinite(group.shape_sigma) else None
-        out[shape.name] = Quantity(float(at), unsure, shape.unit)
-    return out
-
-
-def _size_of(there: WidenedSet, member: Member) -> float:
-    at = there.set.members.index(member)
-    return float(priors.SIZES[there.set.sizes.members[at]])
 
 
 def _having(pairing: CausePairing, direction: Direction) -> list[DiagnosedRecording]:

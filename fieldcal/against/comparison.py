@@ -89,8 +89,8 @@ def _probability(
     if differences:
         return float(np.prod([d.probability for d in differences]))
     alike = [
-        1 - differ
-        for key, (_, differ) in found.relations.items()
+        1 - relation.differs
+        for key, relation in found.relations.items()
         if found.both_show(key)
     ]
     return float(np.prod(alike))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.against import causes, offsets
+from fieldcal.against.calibrations import DETERMINED, calibration_group, shared_axes
+from fieldcal.against.cause_values import cause_quantities
 from fieldcal.against.noise_levels import noise_level
 from fieldcal.against.result import Facts
 from fieldcal.against.side import DiagnosedRecording
@@ -39,7 +40,7 @@ def effects_with_equation(there: WidenedSet) -> dict[str, dict[str, Quantity]]:
     out: dict[str, dict[str, Quantity]] = {}
     for cause, group in there.set.members:
         if cause.kind == "effect":
-            found = causes.cause_quantities(there, (cause, group))
+            found = cause_quantities(there, (cause, group))
             out[cause.name] = {**out.get(cause.name, {}), **found}
     return out
 
@@ -47,12 +48,12 @@ def effects_with_equation(there: WidenedSet) -> dict[str, dict[str, Quantity]]:
 def _calibration(there: WidenedSet) -> dict[str, dict[str, Quantity]]:
     """Determined values of the calibration, by group and axis."""
     out: dict[str, dict[str, Quantity]] = {}
-    for name, axes in offsets.shared_axes(there, there):
-        values, covariance, _ = offsets.calibration_group(there, name, axes)
+    for name, axes in shared_axes(there, there):
+        values, covariance, _ = calibration_group(there, name, axes)
         sigma = np.sqrt(np.diag(covariance))
         out[name] = {
             "xyz"[c % 3]: Quantity(float(v), float(s), GROUP_UNITS[name])
             for c, v, s in zip(axes.tolist(), values, sigma, strict=True)
-            if s < offsets.DETERMINED[name]
+            if s < DETERMINED[name]
         }
     return out

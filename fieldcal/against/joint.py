@@ -24,7 +24,8 @@ session anyway, and only its size v can be the same. For it, (3) is
 The prior probability that a device has an effect is its chance. A simulator has what
 its device has with the probability `MODELLED`, and then the same size or another one
 with equal probability. Bias and scale factor exist in every device; there the effect is
-the difference d with the covariance C_r + C_s, present with the probability `DIFFERS`.
+the difference d with the covariance C = C_r + C_s, present with the probability
+`DIFFERS`. What that tells of other effects is in `one_device`.
 Source: model evidence of pooled and separate regressions; D. MacKay 1992.
 """
 
@@ -78,7 +79,7 @@ class EffectInformation:
         """Difference of `evidence` and the evidence by (1)."""
         if self.evidence is None:
             return 0.0
-        return self.evidence - _over_sizes(
+        return self.evidence - over_sizes(
             evidence_gains(self.inner, self.rhs, self.largest_diagonal)
         )
 
@@ -88,7 +89,8 @@ class EffectInformation:
         return bool(np.linalg.eigvalsh(self.inner).max(initial=0.0) > 1.0)
 
 
-def _over_sizes(gain: Array) -> float:
+def over_sizes(gain: Array) -> float:
+    """Ln evidence of an effect of any size, from that at each of `SIZES`."""
     return float(np.logaddexp.reduce(gain + LOG_DENSITY))
 
 
@@ -98,6 +100,7 @@ def relation_probabilities(
     chance: float,
     alike: float | None,
     scaled: float | None = None,
+    of_one_device: Mapping[Relation, float] | None = None,
 ) -> dict[Relation, float]:
     """Probability of each relation between two sessions in one effect.
 
@@ -107,6 +110,7 @@ def relation_probabilities(
     chance : prior probability that a device has the effect
     alike : ln evidence of the same effect in both (3), if not to be calculated here
     scaled : ln evidence of proportional effects (7), if the effect has an equation
+    of_one_device : further ln evidence of each relation, of both being one device
 
     """
     one, two = ((None if t is None else t.gain) for t in (real, sim))
@@ -114,15 +118,17 @@ def relation_probabilities(
     alone = float(np.log(chance) + np.log1p(-MODELLED))
     half = float(np.log(chance) + np.log(MODELLED) - np.log(2))
     if one is not None:
-        score["real"] = alone + _over_sizes(one)
+        score["real"] = alone + over_sizes(one)
     if two is not None:
-        score["simulator"] = alone + _over_sizes(two)
+        score["simulator"] = alone + over_sizes(two)
     if one is not None and two is not None and real and sim:
-        other = _over_sizes(one) + _over_sizes(two)  # (4)
+        other = over_sizes(one) + over_sizes(two)  # (4)
         if scaled is not None:
             other = float(np.logaddexp(other, scaled) - np.log(2))
         score["other"] = half + other
         score["same"] = half + (evidence_of_same(real, sim) if alike is None else alike)
+    for name, more in (of_one_device or {}).items():
+        score[name] += more
     total = np.logaddexp.reduce(np.array(list(score.values())))
     return {name: float(np.exp(s - total)) for name, s in score.items()}
 
@@ -136,7 +142,7 @@ def evidence_of_same(real: EffectInformation, sim: EffectInformation) -> float:
         real.rhs + sim.rhs,
         real.largest_diagonal + sim.largest_diagonal,
     )
-    return _over_sizes(there) + real.shift + sim.shift
+    return over_sizes(there) + real.shift + sim.shift
 
 
 def evidence_of_proportional(
@@ -145,7 +151,7 @@ def evidence_of_proportional(
     """Ln evidence of an effect in one, and of a multiple of it in the other (7)."""
     if real.inner.shape != sim.inner.shape:
         return None
-    known, other = sorted((real, sim), key=lambda t: -_over_sizes(t.gain))
+    known, other = sorted((real, sim), key=lambda t: -over_sizes(t.gain))
     course = np.linalg.solve(known.inner + np.eye(len(known.rhs)), known.rhs)
     size = float(np.linalg.norm(course))
     if size == 0:
@@ -153,12 +159,12 @@ def evidence_of_proportional(
     along = course / size
     inner, rhs = along @ other.inner @ along, along @ other.rhs
     times = evidence_gains(np.array([[inner]]), np.array([rhs]), other.largest_diagonal)
-    return _over_sizes(known.gain) + _over_sizes(times) + other.shift
+    return over_sizes(known.gain) + over_sizes(times) + other.shift
 
 
 def evidence_of_same_size(real: EffectInformation, sim: EffectInformation) -> float:
     """Ln evidence of a random effect of the same size in both (6)."""
-    return _over_sizes(real.gain + sim.gain)
+    return over_sizes(real.gain + sim.gain)
 
 
 def probability_of_difference(
@@ -168,13 +174,24 @@ def probability_of_difference(
 
     `typical` (k,) is the typical size of a real difference.
     """
+    odds = np.log(DIFFERS) - np.log1p(-DIFFERS)
+    return float(
+        probability_of_log_odds(
+            odds + evidence_of_difference(difference, covariance, typical)
+        )
+    )
+
+
+def evidence_of_difference(
+    difference: Array, covariance: Array, typical: Array
+) -> float:
+    """Ln evidence of a difference, over that of none."""
     information = np.linalg.inv(covariance)
     inner = information * typical * typical[:, None]
     told = EffectInformation(
         inner, typical * (information @ difference), float(np.diag(inner).max())
     )
-    odds = np.log(DIFFERS) - np.log1p(-DIFFERS) + _over_sizes(told.gain)
-    return float(probability_of_log_odds(odds))
+    return over_sizes(told.gain)
 
 
 def likeliest_difference(found: Mapping[Relation, float]) -> Relation:

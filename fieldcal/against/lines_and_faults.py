@@ -1,7 +1,9 @@
 """Differences in lines of the spectrum and in faults of the signal chain.
 
 A line that both recordings have can rise above the noise of a channel in one of them
-only. There, its amplitude is measured in the other too: it is not taken for zero.
+only. There, its amplitude is measured in the other too: it is not taken for zero. So is
+a touch that only one shows no difference if the other has a slip or a jump at that
+instant: both are parts of one event.
 """
 
 from __future__ import annotations
@@ -35,6 +37,9 @@ SAME_GRID = 0.01
 WHEN = ("at_s", "from_s", "to_s", "for_s")
 """Parameters that state when something happened; they are no property of a device."""
 
+EVENT_SIGMAS = 3.0
+"""Deviation of an instant of the same event, standard deviations."""
+
 APART_HZ = 0.5
 """Largest frequency difference of the same line, in cycles per recording."""
 
@@ -57,15 +62,42 @@ def compare_lines_and_faults(
         two = next((f for f in theirs if _is_same(one, f, length)), None)
         if two is not None:
             theirs.remove(two)
+        elif _is_of_event(one, real, sim):
+            continue
         found = _line_or_fault(one, two or _faint_line(one, sim), real, sim)
         apart += [found] if found else []
         alike += [] if found else [one.id]
     for two in theirs:
+        if _is_of_event(two, sim, real):
+            continue
         found = _line_or_fault(two, _faint_line(two, real), sim, real)
         apart += [_seen_from_recording(found)] if found else []
         alike += [] if found else [two.id]
     differing = {d.id for d in apart}
     return apart, tuple(dict.fromkeys(n for n in alike if n not in differing))
+
+
+def _is_of_event(
+    one: FoundEffect, source: DiagnosedRecording, other: DiagnosedRecording
+) -> bool:
+    """Whether an effect of `source` is but an event that `other` has at its instant.
+
+    A slip turns the device: the samples of that turn are found as a bump, or are not.
+    """
+    if "at_s" not in one.parameters or not one.parameters.keys() <= set(WHEN):
+        return False
+    first, length = (
+        float(one.parameters[n].value) if n in one.parameters else 0.0
+        for n in ("at_s", "for_s")
+    )
+    later = other.start - source.start
+    for effect in other.diagnosis.effects:
+        if at := effect.parameters.get("at_s"):
+            off = float(at.value) - later - first
+            unsure = EVENT_SIGMAS * (at.sigma or 0.0)
+            if -unsure < off < length + unsure:
+                return True
+    return False
 
 
 def _seen_from_recording(found: Difference) -> Difference:

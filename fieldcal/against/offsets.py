@@ -1,8 +1,4 @@
-"""Differences of bias and scale factor, and of the Earth's rate.
-
-Biases wander between sessions as much as within one, since flicker has the same power
-in every octave. The covariance of a bias difference includes that scatter.
-"""
+"""Differences of bias and scale factor, and of the Earth's rate."""
 
 from __future__ import annotations
 
@@ -10,22 +6,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fieldcal.against.causes import DecidedCauses, cause_quantities
+from fieldcal.against.calibrations import (
+    DETERMINED,
+    calibration_group,
+    scatter_between_sets,
+    shared_axes,
+)
+from fieldcal.against.causes import DecidedCauses, instead_of_calibration
 from fieldcal.against.joint import probability_of_difference
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
-from fieldcal.against.widened import WidenedSet
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import CHANNELS, Array, Index
-from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import thresholds
-from fieldcal.model.causes.cause import Group
-from fieldcal.model.posterior.mixture import covariance_of_means
-from fieldcal.model.posterior.model_average import average_of_columns
-
-DETERMINED = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
-"""Sigma from which a difference counts as not determined, m/s^2, rad/s, 1."""
 
 
 def calibration_differences(found: DecidedCauses) -> Iterator[Difference]:
@@ -77,91 +71,6 @@ def _feels_rate(rate: Array, covariance: Array) -> bool:
     )
 
 
-def shared_axes(one: WidenedSet, two: WidenedSet) -> Iterator[tuple[str, Index]]:
-    """Groups of a calibration, with the channels that two sessions both have."""
-    for name in GROUP_UNITS:
-        groups = [_group(w, name) for w in (one, two)]
-        axes = [
-            _channels_of_group(w, g)
-            for w, g in zip((one, two), groups, strict=True)
-            if g
-        ]
-        if len(axes) == len(groups) and len(both := np.intersect1d(axes[0], axes[1])):
-            yield name, both
-
-
-def calibration_group(
-    there: WidenedSet, name: str, axes: Index
-) -> tuple[Array, Array, Array]:
-    """A group of one session's calibration.
-
-    Parameters
-    ----------
-    there : the session
-    name : acc_bias, acc_scale, gyr_bias or gyr_scale
-    axes : (k,) channels
-
-    Returns
-    -------
-    values (k,) and covariance (k, k), m/s^2, rad/s or 1, and typical sizes (k,)
-
-    """
-    d, nominal = there.fit.dictionary, there.fit.nominal
-    first, base = (
-        (d.bias, nominal.bias) if name.endswith("bias") else (d.scale, nominal.scale)
-    )
-    group = _group(there, name)
-    if group is None:
-        raise KeyError(name)
-    values, covariance = there.estimate(first + axes)
-    typical = group.typical[np.isin(group.columns, first + axes)]
-    if name.endswith("bias"):
-        covariance = covariance + np.diag(bias_wander(there, axes) ** 2)
-    return base[axes] + values, covariance, typical
-
-
-def scatter_between_sets(explanation: Explanation, name: str, axes: Index) -> Array:
-    """Covariance of a calibration's scatter over the probable sets, (k, k).
-
-    A cause and its alias lead to different biases and scale factors.
-    """
-    d = explanation.dictionary
-    columns = (d.bias if name.endswith("bias") else d.scale) + axes
-    sets = explanation.model_average.sets
-    weight = np.array([w for _, w in sets])
-    weight /= weight.sum()
-    means = np.array([average_of_columns([(s, 1.0)], columns)[0] for s, _ in sets])
-    return covariance_of_means(means, weight)
-
-
-def bias_wander(there: WidenedSet, axes: Index) -> Array:
-    """Standard deviation of biases within a session, (k,) of some channels.
-
-    It combines the instability from window to window and the rms q sqrt(T / 3) of the
-    mean of a random walk.
-    """
-    tau = there.sets.instability_sigma(there.set.sizes.instability)
-    square = tau[axes] ** 2
-    length = float(np.ptp(there.fit.dictionary.x.t))
-    for member in there.set.members:
-        for name, q in cause_quantities(there, member).items():
-            if member[0].kind == "random" and name in CHANNELS:
-                square[axes == CHANNELS.index(name)] += float(q.value) ** 2 * length / 3
-    out: Array = np.sqrt(square)
-    return out
-
-
-def _group(there: WidenedSet, name: str) -> Group | None:
-    part, _, cause = name.partition("_")
-    always = there.fit.dictionary.always
-    return next((g for g in always if g.cause == cause and g.part == part), None)
-
-
-def _channels_of_group(there: WidenedSet, group: Group) -> Index:
-    d = there.fit.dictionary
-    return group.columns - (d.bias if group.cause == "bias" else d.scale)
-
-
 def _difference(found: DecidedCauses, name: str, axes: Index) -> Iterator[Difference]:
     (one, cov, typical), (two, more, _) = (
         calibration_group(w, name, axes) for w in (found.real, found.sim)
@@ -195,7 +104,8 @@ def _difference(found: DecidedCauses, name: str, axes: Index) -> Iterator[Differ
         for i in known
         if abs(one[i] - two[i]) > thresholds.STANDS_OUT * sigma[i]
     )
-    yield Difference(name, "resized", probability, parameters, where=where)
+    instead = instead_of_calibration(found, name)
+    yield Difference(name, "resized", probability, parameters, instead, where)
 
 
 def _mismatch_everywhere(

@@ -18,8 +18,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.against.calibrations import bias_wander, shared_axes
 from fieldcal.against.causes import DecidedCauses
-from fieldcal.against.offsets import bias_wander, shared_axes
 from fieldcal.against.result import SimulatorPrediction
 from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet

@@ -67,6 +67,8 @@ class Difference:
     where : channel, positions, time and covariate, in the one that has it
     shown : whether the other recording could have shown it
     explained : whether it is an effect of the catalogue or a known quantity
+    direction_probability : of the direction, given that they differ: a simulator may
+        have so little of an effect that its output does not tell it from nothing
 
     """
 
@@ -78,6 +80,7 @@ class Difference:
     where: tuple[Mismatch, ...] = ()
     shown: bool = True
     explained: bool = True
+    direction_probability: float = 1.0
 
     @property
     def sizes(self) -> dict[str, RealAndSimulated]:
@@ -91,6 +94,7 @@ class Difference:
         return {
             "id": self.id,
             "direction": self.direction,
+            "direction_probability": json_number(self.direction_probability),
             "probability": json_number(self.probability),
             "parameters": {n: p.to_json() for n, p in self.parameters.items()},
             "aliases": list(self.aliases),

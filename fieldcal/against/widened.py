@@ -8,7 +8,7 @@ other parameters of the session eliminated.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,26 +60,70 @@ class WidenedSet:
         if (member := self.member(key)) is None:
             return None
         columns, typical = member[1].columns, member[1].typical
-        state = self.set.state
-        kept = np.ones(len(state.columns), dtype=bool)
-        kept[state.places_of(columns)] = False
-        less = Eliminated.of(state.rows, state.columns[kept], state.prior_sigma[kept])
-        inner, rhs = less.schur_complement(columns, typical)
-        own = np.diag(state.rows.matrix(columns, columns)) * typical**2
-        return EffectInformation(inner, rhs, float(own.max()), self.evidence(key))
+        found = _information(_less(self.set.state, columns), columns, typical)
+        return replace(found, evidence=self.evidence(key))
+
+    def information_beside_calibration(self, key: str) -> EffectInformation | None:
+        """The same, while the calibration may be that of any device of its grade."""
+        if (member := self.member(key)) is None:
+            return None
+        columns, typical = member[1].columns, member[1].typical
+        return _information(_less(self.reported_set.state, columns), columns, typical)
+
+    def beside_effect(self, key: str, columns: Index) -> tuple[Array, Array, Array]:
+        """Some columns (k,) without an effect, and how it changes them.
+
+        Returns
+        -------
+        values (k,), covariance (k, k), and slope (k, m): by how much the values are
+        less with one typical size of each parameter; (k, 0) without the effect
+
+        """
+        member = self.member(key)
+        effect = member[1].columns if member else np.zeros(0, dtype=np.intp)
+        less = _less(self.reported_set.state, effect)
+        at = less.places_of(columns)
+        slope = less.inverse[at] @ less.rows.matrix(less.columns, effect)
+        scaled = slope * member[1].typical if member else slope
+        return less.estimate[at], less.inverse[np.ix_(at, at)], scaled
 
     def evidence(self, key: str) -> float:
         """Rise of ln Z with a cause, without its prior probability."""
-        rest = tuple(m for m in self.set.members if m[0].key != key)
-        less = self.sets.reduced(self.set, rest)
+        less = self.without(key).set
         found = self.set.score - self.sets.set_log_prior(self.set.members)
-        return float(found - less.score + self.sets.set_log_prior(rest))
+        return float(found - less.score + self.sets.set_log_prior(less.members))
+
+    def without(self, key: str) -> WidenedSet:
+        """The session without a cause; itself, if it has none of this key."""
+        rest = tuple(m for m in self.set.members if m[0].key != key)
+        if len(rest) == len(self.set.members):
+            return self
+        return self.having(self.sets.reduced(self.set, rest))
+
+    def having(self, found: Set) -> WidenedSet:
+        """The session with another set of causes, and its estimates with these."""
+        return replace(
+            self, set=found, reported_set=average_over_sizes(self.sets, found)
+        )
 
     def estimate(self, columns: Index) -> tuple[Array, Array]:
         """Values and covariance of some columns of the set."""
         state = self.reported_set.state
         at = state.places_of(columns)
         return state.estimate[at], state.inverse[np.ix_(at, at)]
+
+
+def _less(state: Eliminated, columns: Index) -> Eliminated:
+    """A state without some columns, at the sizes that it has."""
+    kept = np.ones(len(state.columns), dtype=bool)
+    kept[state.places_of(columns)] = False
+    return Eliminated.of(state.rows, state.columns[kept], state.prior_sigma[kept])
+
+
+def _information(less: Eliminated, columns: Index, typical: Array) -> EffectInformation:
+    inner, rhs = less.schur_complement(columns, typical)
+    own = np.diag(less.rows.matrix(columns, columns)) * typical**2
+    return EffectInformation(inner, rhs, float(own.max()))
 
 
 def widen_set(

@@ -51,6 +51,7 @@ def paragraph(
         some = [d for d in differences if d.direction == direction]
         if some:
             out.append(f"{lead} {'; '.join(map(difference_with_parameters, some))}.")
+    out += [_other_direction(d) for d in differences if is_direction_open(d)]
     unseen = [d.id for d in differences if not d.shown]
     if unseen:
         out.append(
@@ -58,6 +59,26 @@ def paragraph(
             " is there as well is not known."
         )
     return " ".join([*out, _predicted(*predicted, parts)])
+
+
+def is_direction_open(one: Difference) -> bool:
+    """Whether it is not certain which of the two has an effect."""
+    return one.direction_probability < thresholds.DIFFERS
+
+
+def _other_direction(one: Difference) -> str:
+    """Sentence about a direction that is not certain."""
+    name, sure = one.id.replace("_", " "), one.direction_probability
+    if one.direction == "resized":
+        return (
+            f"That both have {name} is not certain (P {sure:.2f}): one of them may have"
+            " nothing of it."
+        )
+    other = "recording" if one.direction == "added" else "simulator"
+    return (
+        f"That the {other} has nothing of {name} is not certain (P {sure:.2f}): it may"
+        " have too little."
+    )
 
 
 def _predicted(
@@ -155,6 +176,7 @@ def _clearest(one: Difference) -> float:
 
 def difference_row(one: Difference) -> tuple[str, str, str, str]:
     """One row of the table: what, direction, size in each, difference."""
+    who = DIRECTION_WORDS[one.direction] + ("?" if is_direction_open(one) else "")
     told = {
         n: p
         for n, p in (one.sizes or one.parameters).items()
@@ -162,7 +184,7 @@ def difference_row(one: Difference) -> tuple[str, str, str, str]:
     }
     what = one.id.replace("_", " ") + _or_else(one)
     if not told:
-        return what, DIRECTION_WORDS[one.direction], "", ""
+        return what, who, "", ""
     name = max(told, key=lambda n: _significance(told[n].difference))
     pair = told[name]
     more = sum(_significance(p.difference) > STANDS_OUT for p in told.values()) - 1
@@ -175,7 +197,7 @@ def difference_row(one: Difference) -> tuple[str, str, str, str]:
     )
     return (
         what,
-        DIRECTION_WORDS[one.direction],
+        who,
         f"{name}: {both}{also}",
         format_unit(with_sign(pair.difference)),
     )

@@ -29,7 +29,7 @@ class GravityError(Motion):
     cure = "Give latitude and height of the site, or its surveyed gravity."
     source = "NIMA TR8350.2; up to 3e-3 for a wrong latitude and height"
     order = 0
-    like_calibration = True
+    like_calibration = "acc_scale"
 
     def chance(self, x: Experience) -> float:
         """A site that was not stated is common."""

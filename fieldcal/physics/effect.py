@@ -87,8 +87,8 @@ class Effect(ABC):
     carried_by: ClassVar[str] = ""
     """Group of a calibration that has it in it, beside one of its own name."""
 
-    like_calibration: ClassVar[bool] = False
-    """Whether bias and scale factor do the same, so that it is only ever possible."""
+    like_calibration: ClassVar[str] = ""
+    """Group of a calibration that does the same, so that it is only ever possible."""
 
     while_moving: ClassVar[bool] = False
     """Whether it shows only where a reference follows the motion moment by moment."""

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from fieldcal.against import offsets
+from fieldcal.against import calibrations
 from fieldcal.against.causes import DecidedCauses
 from fieldcal.against.filters import filter_difference
 from fieldcal.diagnosis.explain import Explanation
@@ -90,5 +90,5 @@ def test_sets_that_may_all_be_right_have_biases_apart() -> None:
         dictionary=SimpleNamespace(bias=2, scale=8),
         model_average=SimpleNamespace(sets=sets)
     ))  # fmt: skip
-    found = offsets.scatter_between_sets(explanation, "acc_bias", np.array([0, 1]))
+    found = calibrations.scatter_between_sets(explanation, "acc_bias", np.array([0, 1]))
     np.testing.assert_allclose(found, [[3.0, 0.0], [0.0, 0.0]], atol=1e-12)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from strapdown_sessions import DEVICE, played
 
 from fieldcal.against.lines_and_faults import compare_lines_and_faults
 from fieldcal.against.side import DiagnosedRecording, diagnose_side
+from fieldcal.diagnosis.result import FoundEffect, Quantity
 
 HZ, LOUD = 7.3, 0.02
 """Hz, and amplitude on a_x, m/s^2: 60 standard deviations."""
@@ -24,6 +26,38 @@ def humming(seed: int, weak: float) -> DiagnosedRecording:
     wave = np.sin(2 * np.pi * HZ * block.t)
     acc = block.acc + np.outer(wave, [LOUD, weak, 0.0])
     return diagnose_side("simulator", replace(block, acc=acc), about)
+
+
+def with_effects(one: DiagnosedRecording, **at: tuple[float, float]) -> Any:
+    """The recording with effects of an instant alone: when, and for how long or ±."""
+    effects = [
+        FoundEffect(
+            name,
+            {"at_s": Quantity(when, 0.05, "s"), "for_s": Quantity(much, 0.1, "s")}
+            if name == "bump"
+            else {"at_s": Quantity(when, much, "s")},
+        )
+        for name, (when, much) in at.items()
+    ]
+    return replace(one, diagnosis=replace(one.diagnosis, effects=tuple(effects)))
+
+
+def test_a_touch_at_the_instant_of_a_slip_of_the_other_is_that_slip(
+    clear: DiagnosedRecording, faint: DiagnosedRecording
+) -> None:
+    """Both slip there; in one the samples of the turn stand out of the noise."""
+    at = clear.start + 20.0
+    touched = with_effects(clear, bump=(at, 0.3), mount_slip=(at + 1.0, 2.0))
+    slipped = with_effects(faint, mount_slip=(at + 2.0, 1.5))
+    still = with_effects(faint)
+    elsewhere = with_effects(faint, mount_slip=(at + 30.0, 1.5))
+    assert compare_lines_and_faults(touched, slipped) == ([], ())
+    assert compare_lines_and_faults(slipped, touched) == ([], ())
+    for other in (still, elsewhere):
+        (one,), _ = compare_lines_and_faults(touched, other)
+        (two,), _ = compare_lines_and_faults(other, touched)
+        assert (one.id, one.direction) == ("bump", "left_out")
+        assert (two.id, two.direction) == ("bump", "added")
 
 
 def told(one: DiagnosedRecording) -> set[str]:

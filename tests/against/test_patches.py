@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from fieldcal.against import causes, patches
+from fieldcal.against import patches
 from fieldcal.against.facts import effects_with_equation
 from fieldcal.against.result import (
     Difference,
@@ -284,7 +284,9 @@ def test_an_effect_of_two_triads_is_known_with_both(
     there: Any = SimpleNamespace(
         set=SimpleNamespace(members=[(cause, triad) for triad in triads])
     )
-    monkeypatch.setattr(causes, "cause_quantities", lambda _, member: triads[member[1]])
+    monkeypatch.setattr(
+        "fieldcal.against.facts.cause_quantities", lambda _, member: triads[member[1]]
+    )
     found = effects_with_equation(there)
     assert found == {"temperature_bias": slopes}
 

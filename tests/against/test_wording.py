@@ -2,8 +2,19 @@
 
 from dataclasses import replace
 
-from fieldcal.against.result import Difference, RealAndSimulated
-from fieldcal.against.wording import difference_rows, possible_difference
+import pytest
+
+from fieldcal.against.result import (
+    Difference,
+    Direction,
+    RealAndSimulated,
+    SimulatorPrediction,
+)
+from fieldcal.against.wording import (
+    difference_rows,
+    paragraph,
+    possible_difference,
+)
 from fieldcal.diagnosis.result import Quantity
 
 
@@ -43,3 +54,25 @@ def test_what_one_of_the_two_cannot_show_is_not_said_to_differ_perhaps() -> None
     )
     said = possible_difference(replace(hidden, direction="added"))
     assert "in the output of the recording would show it" in said
+
+
+@pytest.mark.parametrize(
+    ("direction", "expected"),
+    [
+        ("left_out", "That the simulator has nothing of bump is not certain (P 0.79)"),
+        ("added", "That the recording has nothing of bump is not certain (P 0.79)"),
+        ("resized", "That both have bump is not certain (P 0.79)"),
+    ],
+)
+def test_a_direction_that_is_not_certain_is_said_so(
+    direction: Direction, expected: str
+) -> None:
+    """A simulator may have so little of it that its output is as without it."""
+    predicted = SimulatorPrediction(1.0, 1.0, 1.0), SimulatorPrediction(1.0, 1.0, 1.0)
+    sure = replace(bump(12.0, 1.0), direction=direction)
+    perhaps = replace(sure, direction_probability=0.79)
+    assert expected in paragraph("left_out", [perhaps], predicted)
+    assert "certain" not in paragraph("left_out", [sure], predicted)
+    words = [difference_rows([one])[0][1] for one in (sure, perhaps)]
+    assert words[1] == f"{words[0]}?"
+    assert perhaps.to_json()["direction_probability"] == 0.79

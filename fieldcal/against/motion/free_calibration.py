@@ -9,10 +9,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fieldcal.against.calibrations import DETERMINED
 from fieldcal.against.joint import probability_of_difference
 from fieldcal.against.motion.explanation import MotionExplanation
 from fieldcal.against.motion.fit import column_estimates
-from fieldcal.against.offsets import DETERMINED
 from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS

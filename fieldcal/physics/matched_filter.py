@@ -13,6 +13,10 @@ windows, s_0^2 with nu_0 (`window_variances`):
 
     v_i = max(1, (N_i s_i^2 + nu_0 s_0^2) / (N_i + nu_0)),     nu = N_i + nu_0      (2)
 
+Of s_0^2, 1 is the white noise of all windows; the rest, the part w = 1 - 1 / s_0^2, is
+how they sway or tremble, and that of a hand differs from window to window, of which a
+few windows tell little: nu_0 is at most `SWAY_DOF` / w^2.
+
 A push moves the three axes of a triad at the same time. With R the correlation of
 their amplitudes and b = a / sqrt v, q_i = b' R^-1 b is without a push three times a
 variable of Fisher's distribution F(3, nu). The logarithm of its tail is
@@ -42,6 +46,11 @@ MAX_CORRELATED_SIGMAS = 3.0
 POOLED_DOF, UNCORRELATED_DOF = 4.0, 1.0
 """Weights in a window's correlation of the mean of all windows and of axes that move
 each by itself, in degrees of freedom."""
+
+
+SWAY_DOF = 2.0
+"""Degrees of freedom by which the variance of a hand's sway differs between windows: 1
+to 2.6 in the eight windows of a real recording by hand (MPU-6050, pushes of 0.5 s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +151,8 @@ def amplitude_noise(
     total = np.array([s.sum(axis=0) for s in square])
     each, near = matched.amplitudes_per_dof, len(matched.taps)
     common, nu = variances_of_others(total / np.maximum(count, 1.0), count / each)
+    swaying = 1 - 1 / np.maximum(common, 1.0)
+    nu = np.minimum(nu, SWAY_DOF / np.maximum(swaying, 1e-3) ** 2)
     noise = []
     for w in range(len(windows)):
         left = count[w] - _sums_around(known[w], near)

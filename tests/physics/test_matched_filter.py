@@ -108,12 +108,22 @@ def drawn(nu: float, dof: int, windows: int, seed: int) -> list[Array]:
     return [np.sqrt(v) * rng.standard_normal((dof, 6)) for v in variance]
 
 
-def test_windows_alike_share_one_variance() -> None:
+def test_windows_of_white_noise_share_its_variance() -> None:
     white = MatchedFilter(1, np.array([1.0]), 1.0)
-    windows = [w * 2 for w in drawn(1e9, 12, 40, 5)]
+    windows = [w / 2 for w in drawn(1e9, 12, 40, 5)]
     for one in amplitude_noise(windows, white):
         assert one.dof.min() > 60
-        assert one.variance == pytest.approx(16.0, rel=0.15)
+        assert one.variance == pytest.approx(1.0, rel=0.15)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_few_windows_of_a_hand_do_not_say_how_the_next_sways(seed: int) -> None:
+    """By chance the few may look alike; one that sways six times as far is no push."""
+    white = MatchedFilter(1, np.array([1.0]), 1.0)
+    windows = drawn(1e9, 4, 10, seed)
+    windows[0] *= 6.0
+    first = amplitude_noise(windows, white)[0]
+    assert first.log_chances(windows[0]).min() > np.log(1e-5)
 
 
 def test_the_variance_at_an_instant_knows_nothing_of_it() -> None:

@@ -100,11 +100,14 @@ class Group:
         return np.sort(order[:MAX_OFFERED_COLUMNS])
 
     def with_same_parameters(self, others: Iterable[Group]) -> list[Group]:
-        """Groups among `others` with the same parameters, origin and position."""
-        own = (self.params, self.origin, self.position, self.shape.keys())
-        return [
-            g for g in others if (g.params, g.origin, g.position, g.shape.keys()) == own
-        ]
+        """Groups among `others` with the same parameters, origin and positions."""
+        return [g for g in others if g.identity == self.identity]
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What tells it from other groups of its cause, but for its shape."""
+        where = (self.origin, self.position, self.moved_positions)
+        return *where, self.params, self.shape.keys()
 
     def with_same_shape(self, others: Iterable[Group]) -> list[Group]:
         """Groups among `others` with the same shape, origin and position."""

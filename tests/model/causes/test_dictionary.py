@@ -565,3 +565,12 @@ def test_where_the_rate_of_the_earth_is_measured_each_position_may_be_aside() ->
     table = basis.evaluate(RowView.of(x, d.since, nominal()))
     np.testing.assert_array_equal(np.flatnonzero(table.any(axis=(0, 1))),
                                   group.columns - first_at)  # fmt: skip
+
+
+def test_a_repeated_angle_of_another_dictionary_is_that_of_the_same_positions() -> None:
+    """Angles of one joint differ in nothing but the positions in which they are set."""
+    other = made(ladder())
+    for group in CAUSES["repeated_angle"].variants:
+        ((_, matched),) = other.match_members([(CAUSES["repeated_angle"], group)])
+        assert matched.moved_positions == group.moved_positions
+        assert matched.columns.tolist() == group.columns.tolist()

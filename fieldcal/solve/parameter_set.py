@@ -20,9 +20,8 @@ from fieldcal.calibration.names import TILTS, ParameterName, Tilt, group_of
 from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.model import priors
-from fieldcal.model.causes import columns
 from fieldcal.model.causes.basis import General, RowView
-from fieldcal.model.causes.cause import TRIADS, Cause, Group
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import effect_group, factory_groups
@@ -158,18 +157,14 @@ class ParameterSet(Dictionary):
 
     def _calibration(self) -> Iterator[Group]:
         """Bias and scale factor, free."""
-        sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
-        for part, channels in TRIADS:
-            at = np.intersect1d(channels, self.observed)
-            if not len(at):
-                continue
-            free = priors.FREE_SIZE
+        sizes, free = priors.BIAS * self.unit, priors.FREE_SIZE
+        for part, at in self.triads:
             yield Group("bias", part, self.bias + at, sizes[at], fixed_size=free,
                         in_state=True)  # fmt: skip
             if part == "acc" or self.options.gyr_scale:
                 size = priors.SCALE * self.unit[at]
-                yield Group("scale", part, self.scale + at, size,
-                            fixed_size=priors.FREE_SIZE, in_state=True)  # fmt: skip
+                yield Group("scale", part, self.scale + at, size, fixed_size=free,
+                            in_state=True)  # fmt: skip
 
     def _causes(self) -> Iterator[Cause]:
         """Causes of the requested parameters, and of errors of known size."""
@@ -193,7 +188,7 @@ class ParameterSet(Dictionary):
         if w.angles_deg:
             yield from self._angle_causes(float(np.deg2rad(w.angles_deg)))
         if (lost := np.flatnonzero(self.cut)).size:
-            at = self.add(General("cut", self._truncated_outputs), 3) + lost
+            at = self.add(General("cut", self._truncated_outputs), 3)[lost]
             yield _given_cause(
                 Group("rounding", "acc", at, self.cut[lost], fixed_size=1.0)
             )
@@ -231,18 +226,9 @@ class ParameterSet(Dictionary):
 
     def _earth_rate_cause(self, size: Array) -> Cause:
         """Uncertainty of the Earth's rate."""
-        sides = columns.earth_sides
-        self.earth = self.add(General("earth", columns.earth, sides=sides), 3)
-        kept = np.flatnonzero(size)
+        at, kept = self.add_earth(), np.flatnonzero(size)
         return _given_cause(
-            Group(
-                "earth",
-                "",
-                self.earth + kept,
-                size[kept],
-                fixed_size=1.0,
-                in_state=True,
-            )
+            Group("earth", "", at[kept], size[kept], fixed_size=1.0, in_state=True)
         )
 
     def _truncated_outputs(self, view: RowView) -> Array:

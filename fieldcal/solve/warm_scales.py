@@ -57,7 +57,7 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
         return out.reshape(len(out), 6, -1)
 
     count = ACC_OUTPUTS * len(which)
-    at = table.add(General(WARM_SCALE, columns), count) + np.arange(count)
+    at = table.add(General(WARM_SCALE, columns), count)
     wide = np.abs(np.outer(table.unit[:ACC_OUTPUTS], priors.SCALE_WARMING * size / G0))
     one = Group(
         WARM_SCALE, "", at, wide.ravel(), group.effect, group.shape, group.origin,

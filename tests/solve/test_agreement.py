@@ -26,7 +26,7 @@ PLACES = tuple(
     for a, b in [(0, 0), (45, 5), (45, -40), (-45, 5), (120, 60), (0, 5), (-100, -40)]
 )
 HAND = Position("by hand")
-WIDE = priors.FREE_SIZE * np.array([priors.BIAS_ACC] * 3 + [priors.SCALE] * 3)
+WIDE = priors.FREE_SIZE * np.append(priors.BIAS[:3], [priors.SCALE] * 3)
 STEP = 1e-4
 
 

@@ -165,17 +165,13 @@ def effect_columns(
     """Append the columns of an effect; indices (k,) for each grid point."""
     count = len(effect.params)
     if isinstance(effect, BiasChange):
-        course = bias_change_basis(effect, grid)
-        start = table.add(course, 6 * len(grid))
-        channel = np.array([CHANNELS.index(p.name) for p in effect.params])
-        return [start + channel * len(grid) + i for i in range(len(grid))]
+        at = table.add(bias_change_basis(effect, grid), 6 * len(grid))
+        channel = [CHANNELS.index(p.name) for p in effect.params]
+        return list(at.reshape(6, len(grid))[channel].T)
     if isinstance(effect, Separable):
-        start = table.add(separable_basis(effect, grid), count * len(grid))
-        return [start + i * count + np.arange(count) for i in range(len(grid))]
-    return [
-        table.add(effect_basis(effect, *point), count) + np.arange(count)
-        for point in grid
-    ]
+        at = table.add(separable_basis(effect, grid), count * len(grid))
+        return list(at.reshape(len(grid), count))
+    return [table.add(effect_basis(effect, *point), count) for point in grid]
 
 
 def parameter_groups(

@@ -35,6 +35,6 @@ def hysteresis(table: ColumnTable, size: float) -> Group:
             out[reached, c, c] = np.nan_to_num(np.clip(change[:, c] / G0, -1.0, 1.0))
         return out
 
-    at = table.add(General("hysteresis", columns), 3) + np.arange(3)
+    at = table.add(General("hysteresis", columns), 3)
     wide = size * np.abs(table.unit[:3])
     return Group("factory", "hysteresis", at, wide, fixed_size=1.0)

@@ -95,12 +95,8 @@ class Wander:
         if not len(np.unique(rows.x.position)) < MIN_WINDOWS < len(rows.x):
             return out
         series = FlickerSeries.of(rows.x.t, rows.length)
-        typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3) * unit
-        return replace(
-            out,
-            series=series,
-            unseen=series.residual_variance(rows.y, rows.sd, typical),
-        )
+        unseen = series.residual_variance(rows.y, rows.sd, priors.INSTABILITY * unit)
+        return replace(out, series=series, unseen=unseen)
 
     @classmethod
     def none(cls) -> Wander:

@@ -103,7 +103,6 @@ def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
     are outputs per SI unit.
     """
     walk, walk_chance = _typical_walk(rows)
-    flicker = np.repeat([priors.FLICKER_ACC, priors.FLICKER_GYR], 3)
     out, evidence = np.zeros((2, 6)), np.zeros((2, 6))
     few = len(np.unique(rows.x.position)) < MIN_WINDOWS
     for _, triad in TRIADS:
@@ -121,7 +120,8 @@ def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
         if few:
             evidence[1, at] = -np.inf
             continue
-        flickers = WanderHypotheses(flicker[at] * unit[at], priors.FLICKER_CHANCE, 0.0)
+        size = priors.FLICKER[at] * unit[at]
+        flickers = WanderHypotheses(size, priors.FLICKER_CHANCE, 0.0)
         out[1, at], evidence[1, at] = flickers.sizes(
             [[(d, d.unit_flicker) for d in of_axis] for of_axis in differences]
         )

@@ -22,10 +22,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.basis import General, RowView
-from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
+from fieldcal.model.causes.cause import MIN_WINDOWS, Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.unknown_causes import typical_unknown_sizes
 from fieldcal.model.evidence.eliminated import Eliminated
@@ -34,8 +34,7 @@ from fieldcal.model.evidence.sets import Set
 
 def proportional_causes(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:
     """Causes of proportional offsets, about the window offsets beside each set."""
-    for part, channels in TRIADS:
-        observed = np.intersect1d(channels, dictionary.observed)
+    for part, observed in dictionary.triads:
         if len(observed) < 2 or len(dictionary.window_positions) <= MIN_WINDOWS:
             continue
         about = [_window_offsets(dictionary, fitted, observed) for fitted in sets]
@@ -46,7 +45,7 @@ def proportional_causes(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator
         yield Cause("position", part, priors.UNKNOWN_FUNCTION_CHANCE, groups, "unknown")
 
 
-def _window_offsets(d: Dictionary, fitted: Set, channels: Array) -> Array:
+def _window_offsets(d: Dictionary, fitted: Set, channels: Index) -> Array:
     """Offsets of the windows that a set does not explain, in typical sizes, (p, c)."""
     rows = fitted.state.rows.gram.with_instability(
         priors.SIZES[0] * d.typical_instability
@@ -62,7 +61,7 @@ def _window_offsets(d: Dictionary, fitted: Set, channels: Array) -> Array:
 
 
 def _proportional_group(
-    d: Dictionary, part: str, channels: Array, offsets: Array
+    d: Dictionary, part: str, channels: Index, offsets: Array
 ) -> Group:
     """Group about the leading singular vectors of the offsets."""
     course, size, directions = np.linalg.svd(offsets, full_matrices=False)
@@ -79,5 +78,5 @@ def _proportional_group(
         return out
 
     width = len(offsets) + len(directions) - 1
-    at = d.add(General("in proportion", of), width) + np.arange(width)
+    at = d.add(General("in proportion", of), width)
     return Group("position", part, at, np.ones(width))

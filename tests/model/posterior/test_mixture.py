@@ -24,8 +24,8 @@ SD = 1e-3
 PLACES = tuple(
     Position.deg(a, b) for a, b in [(0, 0), (60, 20), (-50, 40), (20, -70), (150, 10)]
 )
-WIDE = priors.FREE_SIZE * np.array([priors.BIAS_ACC] * 3 + [priors.SCALE] * 3)
-UNSTABLE = priors.INSTABILITY_ACC
+WIDE = priors.FREE_SIZE * np.append(priors.BIAS[:3], [priors.SCALE] * 3)
+UNSTABLE = priors.INSTABILITY[0]
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def hypotheses(one: Case) -> list[tuple[float, int, Array]]:
         for i in range(n):
             for v in range(33):
                 push = np.zeros((n, 3))
-                push[i] = (priors.SIZES[v] * priors.UNKNOWN_ACC) ** 2
+                push[i] = (priors.SIZES[v] * priors.UNKNOWN[0]) ** 2
                 chance = np.log(priors.BAD_WINDOW_CHANCE) + steep(priors.SIZE_TAIL)[v]
                 bad = cov + np.diag(push.ravel())
                 out.append((known(sizes) + float(chance), i, bad))

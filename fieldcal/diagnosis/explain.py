@@ -36,11 +36,10 @@ from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
 from fieldcal.model.posterior.turn_force_information import turn_force_information
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.change_points import change_points
-from fieldcal.model.rows.interruptions import interruptions
 from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.rest_onset import window_starts
 from fieldcal.model.rows.row_source import RowSource
-from fieldcal.model.rows.window_bounds import window_bounds
+from fieldcal.model.rows.window_bounds import interruptions, window_bounds
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import (
     TIME_CONSTANT_LOG_LOSS,

@@ -23,7 +23,7 @@ from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.base_sway import BaseSway, find_base_sway
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.hand_tremor import rows_of_recording
-from fieldcal.model.rows.means import rows_of_means
+from fieldcal.model.rows.reduce import rows_of_means
 from fieldcal.model.rows.rest_onset import rest_instants
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer

@@ -17,7 +17,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.sets import Sets
-from fieldcal.model.evidence.two_grades import chances_of_coarser
+from fieldcal.model.evidence.unfitted_groups import chances_of_coarser
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.row_source import RowSource

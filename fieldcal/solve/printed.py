@@ -17,8 +17,7 @@ from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.solve import least_squares
-from fieldcal.solve.closed_form import two_position
-from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
+from fieldcal.solve.closed_form import ClosedFormEstimate, two_position
 from fieldcal.solve.five_position import five_position
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.options import SolveOptions

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
+from fieldcal.diagnosis.findings.agreement import rms_over_parts
 from fieldcal.diagnosis.result import Candidate, FoundEffect
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import held_out_residuals
-from fieldcal.model.search.offer import Offer
+from fieldcal.model.search.offers import Offer
 from fieldcal.physics.effect import Scatter
 
 LARGEST_LOG_ODDS = 40.0

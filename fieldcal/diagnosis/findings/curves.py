@@ -13,8 +13,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.agreement import ModelResiduals
-from fieldcal.diagnosis.findings.stretch_means import part_means
+from fieldcal.diagnosis.findings.agreement import ModelResiduals, part_means
 from fieldcal.diagnosis.result import Curve, Mismatch
 from fieldcal.model.rows.averages import Rows
 

@@ -8,13 +8,16 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.agreement import ModelResiduals
+from fieldcal.diagnosis.findings.agreement import (
+    ModelResiduals,
+    rms_over_parts,
+    root_mean_square,
+)
 from fieldcal.diagnosis.findings.calibrated import calibration_changes
 from fieldcal.diagnosis.findings.instant import estimate_instant
 from fieldcal.diagnosis.findings.random_sizes import (
     random_sizes,
 )
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
 from fieldcal.diagnosis.result import FoundEffect, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.findings.agreement import part_means
 from fieldcal.diagnosis.findings.correlates import covariate_functions
 from fieldcal.diagnosis.findings.found_effects import (
     CauseRemoval,
     shows_mainly_in_turns,
 )
-from fieldcal.diagnosis.findings.stretch_means import part_means
 from fieldcal.diagnosis.findings.unknown_mismatch import single_errors
 from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import catalogue

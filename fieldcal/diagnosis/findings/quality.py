@@ -17,8 +17,7 @@ from fieldcal.diagnosis.explain import (
     build_fit,
     fit_calibration_only,
 )
-from fieldcal.diagnosis.findings.agreement import ModelResiduals
-from fieldcal.diagnosis.findings.stretch_means import root_mean_square
+from fieldcal.diagnosis.findings.agreement import ModelResiduals, root_mean_square
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.posterior.held_out import (

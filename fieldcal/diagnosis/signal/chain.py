@@ -18,8 +18,8 @@ from fieldcal.core.sampling import sampling_rate
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.orientation import gyro_readings
+from fieldcal.model.rows.reduce import median_sigma
 from fieldcal.model.rows.vibration import quiet_window_noise
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.physics.effect import Chain

@@ -22,10 +22,15 @@ from fieldcal.core.samples import ACC, Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.basis import Course, General
-from fieldcal.model.causes.cause import CLOSURE, MIN_WINDOWS, Cause, Group
+from fieldcal.model.causes.cause import (
+    CLOSURE,
+    MIN_WINDOWS,
+    Cause,
+    EqualWidthGroups,
+    Group,
+)
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
-from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.causes.random_causes import random_causes, series_flicker

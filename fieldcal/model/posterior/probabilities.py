@@ -22,7 +22,7 @@ from fieldcal.model.causes.cause import BOTH, Group, triads_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
-from fieldcal.model.search.offer import Offer
+from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.variations import ALTERNATIVE_MARGIN, visit_variations
 

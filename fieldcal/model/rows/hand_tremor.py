@@ -48,9 +48,8 @@ from fieldcal.model.rows.hand_drift import (
     drift_factor,
     force_turn_rate,
 )
-from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.noise import rounding_noise
-from fieldcal.model.rows.reduce import reduce_to_rows
+from fieldcal.model.rows.reduce import median_sigma, reduce_to_rows
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
 

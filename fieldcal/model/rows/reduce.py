@@ -3,6 +3,10 @@
 Each window is cut into blocks (`window_bounds`), so that a hypothesis costs
 milliseconds however long the recording is. The standard deviation of a mean of n
 white samples of deviation s is s / sqrt(n); s is measured in the recording (`noise`).
+
+A session may hold means alone. Their samples and the turns between them are not
+recorded; each is one row. If no times are stated, all means count as taken at the same
+time, and no effect that depends on time can be found.
 """
 
 from __future__ import annotations
@@ -173,3 +177,34 @@ def _errors_of_values(
     # what a band hides of a gyroscope at rest is the same in each window
     alike[3:] = np.hypot(alike[3:], hidden[:, 3:].max(axis=0, initial=0.0))
     return off, alike
+
+
+def median_sigma(sigma: Array) -> Array:
+    """Median of each channel's (p, 6) over the positions that have one, (6,)."""
+    known = [axis[np.isfinite(axis)] for axis in sigma.T]
+    return np.array([np.median(axis) if len(axis) else np.nan for axis in known])
+
+
+def rows_of_means(source: RowSource, sigma: Array) -> Rows:
+    """One row for each position of which there is a mean.
+
+    Parameters
+    ----------
+    source : the means as samples, one in each window
+    sigma : (p, 6) standard deviation of each position's means, m/s^2 and rad/s
+
+    """
+    windows = window_bounds(source.block, source.about)
+    held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 0)
+    level = median_sigma(sigma[held])
+    still = np.zeros((len(held), 3))
+    out = average_rows(source, windows[held], held, sigma[held], level, still)
+    x = out.x
+    if not source.about.means_timed:
+        same = np.zeros(len(held))
+        x = replace(x, t=same, since_start=same)
+    x = replace(x, since_turn=np.full(len(held), np.inf))
+    off = np.zeros_like(out.sd)
+    earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
+    off[~x.oriented & (len(held) > 1), 3:] = earth
+    return replace(out, x=x, window_error=off)

@@ -9,9 +9,8 @@ import numpy as np
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set, Sets, is_function
 from fieldcal.model.evidence.sizing import Member, Sizes
-from fieldcal.model.search.offer import Offer
-from fieldcal.model.search.offered_pairs import OfferedPair, offered_pairs
-from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offers
+from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offer, Offers
+from fieldcal.model.search.pairs import OfferedPair, offered_pairs
 from fieldcal.model.search.variations import (
     ALTERNATIVE_MARGIN,
     drop_superfluous,

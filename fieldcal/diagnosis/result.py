@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 
 Verdict = Literal["consistent", "left_out", "ambiguous", "unexplained"]
 
@@ -208,7 +207,7 @@ class Curve(Part):
     covariate: str
     unit: str
     x: Array
-    position: NDArray[np.intp]
+    position: Index
     before: Array
     after: Array
     sigma: Array

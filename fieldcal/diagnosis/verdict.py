@@ -36,13 +36,7 @@ from fieldcal.diagnosis.findings.unknown_mismatch import (
     unknown_mismatches,
 )
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.diagnosis.result import (
-    Diagnosis,
-    FoundEffect,
-    Mismatch,
-    Quality,
-    Verdict,
-)
+from fieldcal.diagnosis.result import Diagnosis, FoundEffect, Mismatch, Quality, Verdict
 from fieldcal.diagnosis.wording.advice import advice
 from fieldcal.diagnosis.wording.lines import by_impact, effect_lines
 from fieldcal.diagnosis.wording.paragraph import notes, paragraph

@@ -17,12 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.physics.effect import Motion, Sensor
-from fieldcal.solve.observations import Mask
 from fieldcal.solve.parameter_set import ParameterSet
 
 MAX_ROUNDED_LENGTH = 1e-9

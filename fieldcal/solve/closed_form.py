@@ -24,9 +24,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.errors import NotObservable
-from fieldcal.core.samples import ACC, Array
+from fieldcal.core.samples import ACC, Array, Mask
 from fieldcal.model.causes.planned import ACC_CALIBRATION
-from fieldcal.solve.observations import Mask, Observations
+from fieldcal.solve.observations import Observations
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.calibration import Nominal
 from fieldcal.core.base_motion import BaseMotion
@@ -24,11 +22,9 @@ from fieldcal.core.positions import (
     specific_forces,
     table_rates,
 )
-from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array
+from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Index, Mask
 from fieldcal.windows import Average
 
-Index = NDArray[np.integer[Any]]
-Mask = NDArray[np.bool_]
 MIN_EIGENVALUE = 1e-6
 """Least eigenvalue of a correlation matrix that is taken as known."""
 

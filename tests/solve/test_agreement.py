@@ -9,7 +9,7 @@ import pytest
 from observed import BIAS, SCALE, G, observe, outputs
 
 from fieldcal.core.positions import Position
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.state import State
 from fieldcal.solve import agreement, solve
@@ -17,7 +17,6 @@ from fieldcal.solve.agreement import LargestResidual, TriadFit
 from fieldcal.solve.base_rate import with_base_rate
 from fieldcal.solve.estimation import ParameterEstimate, estimate_parameters
 from fieldcal.solve.observation_rows import rows_of_observations
-from fieldcal.solve.observations import Index
 from fieldcal.solve.parameter_set import ParameterSetOptions
 
 SIZE = np.array([1e-3, 2e-3, 0.7e-3])

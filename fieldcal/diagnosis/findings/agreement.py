@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.rows.averages import Rows
 
@@ -18,7 +17,7 @@ PART_ENDS = (0.0, 0.1, 0.25, 0.5, 1.0)
 """Ends of the parts of a window over which residuals are averaged."""
 
 
-def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, Index]:
     """Means over parts of the windows.
 
     Returns

@@ -15,17 +15,13 @@ from fieldcal.diagnosis.findings.agreement import (
 )
 from fieldcal.diagnosis.findings.calibrated import calibration_changes
 from fieldcal.diagnosis.findings.instant import estimate_instant
-from fieldcal.diagnosis.findings.random_sizes import (
-    random_sizes,
-)
+from fieldcal.diagnosis.findings.random_sizes import random_sizes
 from fieldcal.diagnosis.result import FoundEffect, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import (
-    Member,
-)
+from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.common_axes import in_common_axes, parameter_rows
 from fieldcal.model.posterior.held_out import held_out_turn_residuals, turn_residual
 from fieldcal.model.posterior.probabilities import ProbableCause

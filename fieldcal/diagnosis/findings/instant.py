@@ -15,9 +15,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
@@ -84,11 +83,11 @@ def _possible_instants(
     return float(span[first, 0]), float(span[last, 1])
 
 
-def _at_rest(explanation: Explanation, t: Array) -> NDArray[np.bool_]:
+def _at_rest(explanation: Explanation, t: Array) -> Mask:
     """Whether samples at times t (n,) lie within a row, (n,)."""
     span = explanation.rows.span
     row = np.clip(np.searchsorted(span[:, 1], t), 0, len(span) - 1)
-    inside: NDArray[np.bool_] = (t >= span[row, 0]) & (t <= span[row, 1])
+    inside: Mask = (t >= span[row, 0]) & (t <= span[row, 1])
     return inside
 
 

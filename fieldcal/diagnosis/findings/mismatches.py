@@ -10,9 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.agreement import part_means
 from fieldcal.diagnosis.findings.correlates import covariate_functions
@@ -81,7 +80,7 @@ def _in_windows(
     )
 
 
-def outstanding_positions(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
+def outstanding_positions(z: Array, position: Index) -> tuple[int, ...]:
     """Positions with a significant residual; that of the largest, if there is none."""
     size = np.nan_to_num(np.abs(z))
     out = np.unique(position[size > thresholds.STANDS_OUT])
@@ -226,7 +225,7 @@ def best_correlate(
 
 
 def of_faults(
-    t: Array, windows: NDArray[np.intp], faults: Sequence[tuple[str, Fault]]
+    t: Array, windows: Index, faults: Sequence[tuple[str, Fault]]
 ) -> Iterator[Mismatch]:
     """Mismatches by faults of samples."""
     for name, fault in faults:

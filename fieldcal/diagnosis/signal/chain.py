@@ -10,10 +10,9 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.positions import alpha_beta_angles, gamma_angles
-from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.core.samples import CHANNELS, Array, Block, Index, Mask
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
@@ -45,7 +44,7 @@ class CheckedRecording:
     """
 
     block: Block
-    usable: NDArray[np.bool_]
+    usable: Mask
     faults: tuple[tuple[str, Fault], ...]
     noise: Array
     unused: tuple[str, ...] = ()
@@ -104,10 +103,7 @@ def check_chain(block: Block, about: Description) -> CheckedRecording:
 
 
 def _correct(
-    block: Block,
-    usable: NDArray[np.bool_],
-    about: Description,
-    faults: list[tuple[str, Fault]],
+    block: Block, usable: Mask, about: Description, faults: list[tuple[str, Fault]]
 ) -> tuple[Block, CheckedSamples]:
     """Correct the faults that can be undone; they are appended to `faults`."""
     samples = samples_to_check(block, usable, about)
@@ -164,9 +160,7 @@ def _mend_samples(block: Block, fault: Fault) -> Array:
     return six
 
 
-def _mark_unusable(
-    name: str, fault: Fault, usable: NDArray[np.bool_], windows: NDArray[np.intp]
-) -> None:
+def _mark_unusable(name: str, fault: Fault, usable: Mask, windows: Index) -> None:
     if name == "bump":
         usable[fault.rows] = False
         return
@@ -214,9 +208,7 @@ def _without_rail_runs(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault
     ]
 
 
-def samples_to_check(
-    block: Block, usable: NDArray[np.bool_], about: Description
-) -> CheckedSamples:
+def samples_to_check(block: Block, usable: Mask, about: Description) -> CheckedSamples:
     """Samples and facts that the checks are given."""
     windows, rate = window_bounds(block, about), sampling_rate(block)
     block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 
@@ -42,8 +41,8 @@ class Moments:
     near: float
     sums: Complex
     middle: Array
-    bound: NDArray[np.intp]
-    window: NDArray[np.intp]
+    bound: Index
+    window: Index
     counts: Array
 
     def amplitudes(self, offset: Array) -> Complex:
@@ -53,7 +52,7 @@ class Moments:
         amplitude: Complex = 2 / self.counts[:, None] * np.stack(parts, axis=1)
         return amplitude
 
-    def select(self, groups: NDArray[np.bool_]) -> Moments:
+    def select(self, groups: Mask) -> Moments:
         """The moments of some groups only, `groups` (g,)."""
         size = np.diff(self.bound)
         parts = np.repeat(groups, size)

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.diagnosis.signal.periodogram import (
     FLOOR_NEIGHBOURS,
     FURTHEST_NEIGHBOUR,
@@ -144,7 +143,7 @@ def _highest_in_spectrum(
     return best
 
 
-def _away_from(hz: Array, peaks: Sequence[Peak], reach: float) -> NDArray[np.bool_]:
+def _away_from(hz: Array, peaks: Sequence[Peak], reach: float) -> Mask:
     """Frequencies that are close to none of some peaks, (m,)."""
     free = np.ones(len(hz), dtype=bool)
     for peak in peaks:

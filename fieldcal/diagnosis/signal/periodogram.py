@@ -21,9 +21,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 from fieldcal.physics.recording import medians
 
@@ -96,7 +95,7 @@ class Spectrum:
         """Channels that are searched, ascending."""
         return sorted({c for group in self.channel_groups for c in group})
 
-    def power_over_noise(self, channel: int, band: NDArray[np.bool_]) -> Array:
+    def power_over_noise(self, channel: int, band: Mask) -> Array:
         """Power in a band over that of noise; Gamma(count) if there is noise only."""
         power = self.power[channel, band]
         known = None if self.known_level is None else self.known_level[channel, band]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.change_points import clear_jumps
@@ -48,7 +48,7 @@ class WindowSamples:
     times: tuple[Array, ...]
     noise: Array
     rate: float
-    usable: tuple[NDArray[np.bool_], ...] = ()
+    usable: tuple[Mask, ...] = ()
     cuts: Array = field(default_factory=lambda: np.zeros(0))
 
     def with_whole_line(self, hz: float, amplitude: Complex) -> WindowSamples:
@@ -113,9 +113,7 @@ def experience_in_windows(
     )
 
 
-def _detrended(
-    t: Array, values: Array, usable: NDArray[np.bool_], cuts: Array
-) -> Array:
+def _detrended(t: Array, values: Array, usable: Mask, cuts: Array) -> Array:
     """Samples less slope and means between cuts, (n, 6); zero if not usable."""
     s = (t - t.mean()) / max(np.ptp(t), 1e-9)
     first = np.unique(np.append(0, np.searchsorted(t, cuts[cuts < t[-1]])))

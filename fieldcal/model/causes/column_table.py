@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fieldcal.core.samples import GYR, Array, Index
+from fieldcal.core.samples import GYR, Array, Index, Mask
 from fieldcal.model.causes import columns, smooth
 from fieldcal.model.causes.basis import Course, General
 from fieldcal.model.causes.cause import TRIADS, Basis
@@ -40,12 +40,7 @@ class ColumnTable:
     """Whether the turns between windows were recorded."""
 
     def __init__(
-        self,
-        x: Experience,
-        used: NDArray[np.bool_],
-        since: Array,
-        unit: Array,
-        wander: Wander,
+        self, x: Experience, used: Mask, since: Array, unit: Array, wander: Wander
     ) -> None:
         self.x, self.used, self.since, self.unit = x, used, since, unit
         self.observed = np.flatnonzero(np.any(used, axis=0))

@@ -15,10 +15,9 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import ACC, Array, Index
+from fieldcal.core.samples import ACC, Array, Index, Mask
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.basis import Course, General
@@ -72,7 +71,7 @@ class Dictionary(ColumnTable):
     def __init__(
         self,
         x: Experience,
-        used: NDArray[np.bool_],
+        used: Mask,
         since: Array,
         common: Array,
         unit: Array,
@@ -170,7 +169,7 @@ class Dictionary(ColumnTable):
         return np.where(out > 0, out, 1.0)
 
     @cached_property
-    def shown(self) -> NDArray[np.bool_]:
+    def shown(self) -> Mask:
         """Columns that are visible in windows; set by the first linearisation."""
         return np.zeros(self.width, dtype=bool)
 

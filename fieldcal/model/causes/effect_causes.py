@@ -89,11 +89,7 @@ def effect_group(
 
 
 def factory_group(
-    table: ColumnTable,
-    name: str,
-    size: Array,
-    turned: bool,
-    point: Point = NO_POINT,
+    table: ColumnTable, name: str, size: Array, turned: bool, point: Point = NO_POINT
 ) -> Group:
     """Group of a factory error, whose coefficients have the known sigma `size`, SI."""
     group = effect_group(table, name, turned, point)

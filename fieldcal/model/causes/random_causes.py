@@ -97,11 +97,7 @@ def _causes_of_scatter(
 
 
 def _walks(
-    table: ColumnTable,
-    effect: Scatter,
-    part: str,
-    channel_sets: Index,
-    share: float,
+    table: ColumnTable, effect: Scatter, part: str, channel_sets: Index, share: float
 ) -> Cause:
     """Cause of random walks, with a variant for each set of channels, (sets, k).
 

@@ -16,9 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +74,7 @@ class Gram:
         local = [self.index[at] for at in columns]
         return [self.within[at[:, :, None], at[:, None, :]] for at in local]
 
-    def select_windows(self, windows: NDArray[np.bool_], info: Array) -> Gram:
+    def select_windows(self, windows: Mask, info: Array) -> Gram:
         """Some windows, with other information on their means."""
         parts = (
             "means",

@@ -25,9 +25,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.gram import Gram, WeightedGram
 
@@ -84,7 +83,7 @@ def scan_instabilities(
         taus[0]
     )
     common = _joint_gram(still, all_columns)
-    windows: NDArray[np.bool_] = np.any(moved, axis=1)
+    windows: Mask = np.any(moved, axis=1)
     reduced = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
     table = np.append(
         reduced.means[:, :, reduced.index[all_columns]],
@@ -108,14 +107,14 @@ def scan_instabilities(
     )
 
 
-def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> NDArray[np.bool_]:
+def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> Mask:
     """Means whose noise depends on instabilities of some kinds, (p, 6)."""
     own = np.isin(gram.kind, kinds)
     if bent := [k for k in kinds if k < gram.closure_errors.shape[2]]:
         own |= gram.closure_errors[:, :, bent].any(axis=2)
     turned = gram.free_rotations.any(axis=2)
     own |= turned & np.any(turned & own, axis=1)[:, None]
-    out: NDArray[np.bool_] = own & (gram.info > 0)
+    out: Mask = own & (gram.info > 0)
     return out
 
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
@@ -64,8 +63,7 @@ class HeldOut:
                 continue
             left = self.fold == i
             chosen = max(
-                (rest.evaluate(s.members, s.sizes) for s in sets),
-                key=lambda s: s.score,
+                (rest.evaluate(s.members, s.sizes) for s in sets), key=lambda s: s.score
             )
             step = (
                 self.fitted.values
@@ -171,11 +169,11 @@ def turn_residual(turn: TurnRows, estimate: Array) -> Array:
     return np.concatenate([closure, turn.way - turn.way_design @ values])
 
 
-def folds(d: Dictionary) -> NDArray[np.intp]:
+def folds(d: Dictionary) -> Index:
     """Number of the part that each row is left out in, (n,)."""
     index = np.searchsorted(d.window_positions, d.x.position)
     if len(d.window_positions) >= MIN_WINDOWS:
-        out: NDArray[np.intp] = (index % MAX_FOLDS).astype(np.intp)
+        out: Index = (index % MAX_FOLDS).astype(np.intp)
         return out
     out = np.zeros(len(index), dtype=np.intp)
     for p in d.window_positions:
@@ -192,7 +190,7 @@ def _residual_square(eliminated: Eliminated) -> float:
     return eliminated.rows.square - float(rhs @ eliminated.estimate)
 
 
-def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
+def _columns(d: Dictionary, sets: Sequence[Set]) -> Mask:
     """Columns of some sets and all rotations of positions, (all,)."""
     out = np.zeros(d.width, dtype=bool)
     for candidate in sets:
@@ -201,7 +199,7 @@ def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
     return out
 
 
-def _select_columns(part: LinearRows, columns: NDArray[np.bool_]) -> LinearRows:
+def _select_columns(part: LinearRows, columns: Mask) -> LinearRows:
     kept = columns[part.columns]
     return LinearRows(
         part.channel, part.rows, part.window, part.weight,
@@ -209,7 +207,7 @@ def _select_columns(part: LinearRows, columns: NDArray[np.bool_]) -> LinearRows:
     )  # fmt: skip
 
 
-def _select_rows(part: LinearRows, kept: NDArray[np.bool_]) -> LinearRows:
+def _select_rows(part: LinearRows, kept: Mask) -> LinearRows:
     return LinearRows(
         part.channel, part.rows[kept], part.window[kept], part.weight[kept],
         part.columns, part.design[kept], part.white[kept],
@@ -263,9 +261,7 @@ def _angle_sigmas(chosen: Set, d: Dictionary) -> Array:
     return only
 
 
-def _angles(
-    left: Sequence[LinearRows], d: Dictionary
-) -> Iterator[tuple[int, NDArray[np.intp]]]:
+def _angles(left: Sequence[LinearRows], d: Dictionary) -> Iterator[tuple[int, Index]]:
     """Numbers of the held-out windows, with the columns of their rotations."""
     for j in np.unique(np.concatenate([p.window for p in left])).tolist():
         yield j, d.rotations_of(d.window_positions[j])

@@ -32,11 +32,7 @@ from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.evidence.unfitted_groups import groups_not_in
-from fieldcal.model.posterior.common_axes import (
-    group_in,
-    parameter_rows,
-    pick_columns,
-)
+from fieldcal.model.posterior.common_axes import group_in, parameter_rows, pick_columns
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE, covariance_of_means
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.size_average import average_over_sizes

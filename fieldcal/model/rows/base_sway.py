@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.positions import table_rates
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
@@ -158,9 +157,7 @@ def _known_positions(about: Description) -> list[int]:
 
 
 def _without_sway(
-    block: Block,
-    windows: NDArray[np.intp],
-    waves_by_position: dict[int, list[SwayWaves]],
+    block: Block, windows: Index, waves_by_position: dict[int, list[SwayWaves]]
 ) -> Array:
     """Samples (n, 6), SI, corrected to a base at rest."""
     six, rate = block.six, sampling_rate(block)

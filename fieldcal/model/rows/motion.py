@@ -26,11 +26,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import dct, idct, prev_fast_len
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import ACC, GYR, Array, Block, Index
+from fieldcal.core.samples import ACC, GYR, Array, Block, Index, Mask
 from fieldcal.model.rows.reference import GAP_INTERVALS, MIN_CHANNEL_SAMPLES, Reference
 from fieldcal.model.rows.response import Response
 from fieldcal.model.rows.thermometer import Thermometer
@@ -114,7 +113,7 @@ class MotionRows:
         return len(self.y)
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Mask:
         """Rows with a value, by channel, (n, 6)."""
         return np.isfinite(self.y)
 
@@ -248,11 +247,11 @@ def common_samples(block: Block, reference: Reference) -> Block:
     return kept
 
 
-def _compared_channels(block: Block, reference: Reference) -> NDArray[np.bool_]:
+def _compared_channels(block: Block, reference: Reference) -> Mask:
     """Measured channels of the triads of which the reference has any, (6,)."""
     told = np.repeat(reference.observed.reshape(2, 3).any(axis=1), 3)
     measured = np.isfinite(block.six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
-    compared: NDArray[np.bool_] = told & measured
+    compared: Mask = told & measured
     return compared
 
 

@@ -15,10 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model.rows.averages import Rows, average_rows
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.noise import rounding_sigma, shared_rounding_sigma
@@ -30,7 +29,7 @@ from fieldcal.windows.dead_band import dead_bands, error_of_means
 
 def reduce_to_rows(
     source: RowSource,
-    whole: bool | NDArray[np.bool_] = False,
+    whole: bool | Mask = False,
     level: Array | None = None,
     apart: bool = False,
 ) -> Rows:
@@ -73,18 +72,14 @@ class _CutWindows:
 
     """
 
-    windows: NDArray[np.intp]
-    position: NDArray[np.intp]
-    whole: NDArray[np.bool_]
-    bounds: list[NDArray[np.intp]]
+    windows: Index
+    position: Index
+    whole: Mask
+    bounds: list[Index]
 
     @classmethod
     def of(
-        cls,
-        source: RowSource,
-        block: Block,
-        whole: bool | NDArray[np.bool_],
-        apart: bool,
+        cls, source: RowSource, block: Block, whole: bool | Mask, apart: bool
     ) -> _CutWindows:
         """Cut the windows of `block`, the source's samples that may be used.
 
@@ -154,7 +149,7 @@ def _with_errors_of_site(
 
 
 def _errors_of_values(
-    block: Block, windows: NDArray[np.intp], y: Array, rows: Sequence[int]
+    block: Block, windows: Index, y: Array, rows: Sequence[int]
 ) -> tuple[Array, Array]:
     """Errors by rounding and dead bands, which no average makes smaller.
 

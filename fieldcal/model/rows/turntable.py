@@ -29,11 +29,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.positions import Position, table_rates, unknown_axis_speeds
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.block_means import mean_of_known
 from fieldcal.physics.experience import Experience
 
@@ -81,7 +80,7 @@ class GyroReadings:
     """
 
     positions: Sequence[Position]
-    position: NDArray[np.intp]
+    position: Index
     w: Array
     earth: float = 0.0
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.session.description import Description
 
@@ -30,7 +29,7 @@ MIN_INTERRUPTION_S, MIN_INTERRUPTION_PERIODS = 0.5, 5.0
 """Time, and periods of the samples, without any in which a device may restart."""
 
 
-def window_bounds(block: Block, about: Description) -> NDArray[np.intp]:
+def window_bounds(block: Block, about: Description) -> Index:
     """First and one past the last sample of each position's window, (p, 2).
 
     A session without positions is one window, the whole of it. A position without a
@@ -71,7 +70,7 @@ def block_bounds(
     rate: float,
     windows: int,
     without: Iterable[tuple[float, float]] = (),
-) -> NDArray[np.intp]:
+) -> Index:
     """First and one past the last sample of each block of a window, (k, 2).
 
     Parameters

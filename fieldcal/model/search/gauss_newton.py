@@ -9,9 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Gram
@@ -109,7 +108,7 @@ class GaussNewton:
         """Values of columns, padded with zeros for columns that were added since."""
         return np.pad(values, (0, self.dictionary.width - len(values)))
 
-    def wanted_columns(self, members: Sequence[Member]) -> NDArray[np.bool_]:
+    def wanted_columns(self, members: Sequence[Member]) -> Mask:
         """Columns of a set, permanent groups, and rotations of unknown orientations."""
         d = self.dictionary
         wanted = np.zeros(d.width, dtype=bool)
@@ -128,7 +127,7 @@ class GaussNewton:
         return gram(linear, self.dictionary, values, self.turn_rows)
 
     def gram_of(
-        self, linear: Sequence[LinearRows], values: Array, wanted: NDArray[np.bool_]
+        self, linear: Sequence[LinearRows], values: Array, wanted: Mask
     ) -> Gram:
         """Gram matrix of some columns from linearised rows, with the current turns."""
         columns = np.flatnonzero(wanted)

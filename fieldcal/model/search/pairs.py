@@ -30,9 +30,8 @@ from itertools import combinations
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.eliminated import (
     MIN_EIGENVALUE,
@@ -173,7 +172,7 @@ class _SeparateGroups:
         profile = gains_from_eigenvalues(strength, along**2) + LOG_DENSITY
         return cls(at, own, right, strength, axes, along, profile)
 
-    def at_numbers(self, numbers: Index | NDArray[np.bool_]) -> Self:
+    def at_numbers(self, numbers: Index | Mask) -> Self:
         """The groups of these numbers, which may repeat."""
         return type(self)(*(getattr(self, name)[numbers] for name in self.__slots__))
 

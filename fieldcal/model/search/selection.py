@@ -105,10 +105,7 @@ class Search:
         return current
 
     def _with_one_more(
-        self,
-        current: Set,
-        level: float | None = None,
-        other_sizes: Sizes | None = None,
+        self, current: Set, level: float | None = None, other_sizes: Sizes | None = None
     ) -> Set:
         """The best set with one cause more; the set itself if none comes near a level.
 

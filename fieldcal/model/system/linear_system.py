@@ -15,9 +15,8 @@ from dataclasses import replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.dictionary import Dictionary
@@ -53,9 +52,7 @@ class System(ABC):
         """The same rows with a copy of the dictionary."""
 
     @abstractmethod
-    def linearised(
-        self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[LinearRows]:
+    def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
 
     def linearisation_error(self, state: State, other: State, step: Array) -> float:
@@ -71,9 +68,7 @@ class System(ABC):
         return np.zeros(2)
 
 
-def append_course(
-    parts: Parts, at: Index, table: Array, kept: NDArray[np.bool_]
-) -> None:
+def append_course(parts: Parts, at: Index, table: Array, kept: Mask) -> None:
     """Append the columns `at` of a `Course`, as far as they are `kept`, to `parts`."""
     width = table.shape[1]
     for c, channel_parts in parts.items():
@@ -130,9 +125,7 @@ def gram(
     return replace(out, square=sum(squares))
 
 
-def _add_windows(
-    out: Gram, part: LinearRows, values: Array, free: NDArray[np.bool_]
-) -> float:
+def _add_windows(out: Gram, part: LinearRows, values: Array, free: Mask) -> float:
     """Add one channel's rows; returns its squares about the means.
 
     Of the columns `free` (k,), rotations of unknown orientations, only the means are

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import ACC, GYR, Array, Index
+from fieldcal.core.samples import ACC, GYR, Array, Index, Mask
 from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.cause import TRIADS
 from fieldcal.model.causes.motion_dictionary import MotionDictionary
@@ -48,9 +47,7 @@ class MotionSystem(System):
         """The same rows with a copy of the dictionary."""
         return MotionSystem(self.dictionary.independent_copy(), self.power)
 
-    def linearised(
-        self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[LinearRows]:
+    def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
         d, rows = self.dictionary, self.motion
         views = self._views(state)
@@ -119,7 +116,7 @@ class MotionSystem(System):
             )
         return table
 
-    def _grouped(self) -> NDArray[np.bool_]:
+    def _grouped(self) -> Mask:
         """Columns that belong to a group."""
         d = self.dictionary
         out = np.zeros(d.width, dtype=bool)

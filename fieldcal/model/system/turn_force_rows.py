@@ -14,9 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
@@ -163,12 +162,10 @@ class TurnForceRows:
         return out
 
 
-def turn_force_columns(
-    columns: Index, dictionary: Dictionary, known: Set
-) -> NDArray[np.bool_]:
+def turn_force_columns(columns: Index, dictionary: Dictionary, known: Set) -> Mask:
     """Columns used during turns: no window shows them, or the windows' set has them."""
     held = np.isin(columns, known.state.columns)
-    out: NDArray[np.bool_] = held | ~dictionary.shown[columns]
+    out: Mask = held | ~dictionary.shown[columns]
     return out
 
 

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.rows.averages import Rows
@@ -45,9 +44,7 @@ class WindowSystem(System):
         """The same rows with a copy of the dictionary."""
         return type(self)(self.rows, self.dictionary.independent_copy())
 
-    def linearised(
-        self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[LinearRows]:
+    def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
         d = self.dictionary
         view = RowView.of(self.rows.x, d.since, state)
@@ -86,7 +83,7 @@ class WindowSystem(System):
         """Turn of a position to where its mean force is, (2,) rad; zero if near."""
         return starting_angles(self.rows, nominal, position)
 
-    def _parts(self, view: RowView, wanted: NDArray[np.bool_]) -> Parts:
+    def _parts(self, view: RowView, wanted: Mask) -> Parts:
         """Wanted columns with influence on each channel."""
         parts: Parts = {c: [] for c in self.dictionary.observed.tolist()}
         for first, end, basis in self.dictionary.basis_ranges():
@@ -119,18 +116,14 @@ class WindowSystem(System):
         window = np.searchsorted(d.window_positions, rows.x.position[use])
         return LinearRows(c, use, window, weight, columns, design, off[use] * weight)
 
-    def _shows(self, part: LinearRows) -> NDArray[np.bool_]:
+    def _shows(self, part: LinearRows) -> Mask:
         """Whether each column of a channel shows at its typical size, (k,).
 
         Gyroscopes measure the Earth's rate, so there it must exceed the noise.
         """
         table = np.abs(part.design) * self.dictionary.typical[part.columns]
         if part.channel < 3:
-            visible: NDArray[np.bool_] = (table / part.weight[:, None]).max(
-                axis=0
-            ) > MIN_VISIBLE_ACC
+            visible: Mask = (table / part.weight[:, None]).max(axis=0) > MIN_VISIBLE_ACC
             return visible
-        stands_out: NDArray[np.bool_] = (
-            np.linalg.norm(table, axis=0) > MIN_VISIBLE_SIGMAS
-        )
+        stands_out: Mask = np.linalg.norm(table, axis=0) > MIN_VISIBLE_SIGMAS
         return stands_out

@@ -15,9 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.turns.attitude import interpolate_vectors
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
@@ -78,8 +77,8 @@ class Steps:
     first: int
     t: Array
     each: int
-    edge: NDArray[np.intp]
-    cut: NDArray[np.intp]
+    edge: Index
+    cut: Index
 
     @property
     def at(self) -> Array:

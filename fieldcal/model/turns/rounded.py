@@ -25,9 +25,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Block, Index
+from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model.rows.noise import quantisation_steps, rounding_sigma
 from fieldcal.windows.dead_band import dead_bands
 
@@ -95,9 +94,9 @@ class StandingOutputs:
             out += np.einsum("r,ri,rj->ij", variance, axis, axis)
         return out
 
-    def _at_window_value(self, gyr: Array) -> NDArray[np.bool_]:
+    def _at_window_value(self, gyr: Array) -> Mask:
         """Whether each output (n, 3) has the value of the windows, (n, 3)."""
-        found: NDArray[np.bool_] = np.abs(gyr - self.value) < MAX_STEP_PART * self.step
+        found: Mask = np.abs(gyr - self.value) < MAX_STEP_PART * self.step
         return found
 
 
@@ -111,7 +110,7 @@ def _run_factor(value: Array, length: Array) -> Array:
 
 
 def find_standing_outputs(
-    block: Block, windows: NDArray[np.intp], shared_error: Array
+    block: Block, windows: Index, shared_error: Array
 ) -> StandingOutputs | None:
     """Values of the gyroscopes in the windows; None if no output keeps its value.
 

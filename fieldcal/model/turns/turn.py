@@ -28,10 +28,7 @@ from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross
 from fieldcal.core.running_integral import running_integral
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.turns.attitude import (
-    trapezoid_means,
-    turn_geometry,
-)
+from fieldcal.model.turns.attitude import trapezoid_means, turn_geometry
 from fieldcal.physics.experience import Experience
 
 

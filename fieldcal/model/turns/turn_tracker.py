@@ -11,9 +11,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
@@ -205,7 +204,7 @@ class TurnTracker:
 
 def _without_lost_samples(source: RowSource) -> RowSource:
     """The source with complete samples only, if some between windows are unusable."""
-    unusable: NDArray[np.bool_] = ~np.all(source.usable, axis=1)
+    unusable: Mask = ~np.all(source.usable, axis=1)
     for first, last in window_bounds(source.block, source.about):
         unusable[first:last] = False
     return source.complete_samples if unusable.any() else source

@@ -6,7 +6,6 @@ holds the fit of that set, the fit of the calibration alone, and the probabiliti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -80,6 +79,11 @@ class Explanation:
     best: FittedSet
     calibration_only: FittedSet
     posterior: Posterior
+
+    @property
+    def source(self) -> RowSource:
+        """The samples, and the description of the session."""
+        return self.prepared.source
 
     @property
     def rows(self) -> Rows:
@@ -170,16 +174,12 @@ class Explanation:
         groups = [g for g in self.dictionary.always if g.cause == "earth"]
         return self.evidence_gain([c for g in groups for c in g.columns])
 
-    def evidence_gain(self, columns: Sequence[int]) -> float:
+    def evidence_gain(self, columns: list[int]) -> float:
         """Rise of ln Z by some columns of the best set."""
         if not columns:
             return 0.0
-        posterior = self.best.set.state
-        kept = ~np.isin(posterior.columns, columns)
-        less = type(posterior).of(
-            posterior.rows, posterior.columns[kept], posterior.prior_sigma[kept]
-        )
-        return posterior.score - less.score
+        whole = self.best.set.state
+        return whole.score - whole.without(columns).score
 
     @property
     def shows_earth_rate(self) -> bool:
@@ -195,7 +195,7 @@ class Explanation:
         samples = (
             rows.length.sum()
             / len(d.window_positions)
-            * sampling_rate(self.prepared.source.block)
+            * sampling_rate(self.source.block)
         )
         ratio = EARTH_RATE / (np.nanmax(rows.noise[3:]) / np.sqrt(samples))
         return bool(ratio > thresholds.SEES_EARTH)
@@ -208,7 +208,7 @@ def explain(
 
     The search begins with `before`, the explanation of a part of it, if that is given.
     """
-    fit = build_fit(prepared.source, prepared.rows, prepared)
+    fit = build_fit(prepared)
     begin = None if before is None else _starting_causes(before)
     found = Inference(fit).run(begin)
     posterior = _calculate_posterior(found)
@@ -260,20 +260,17 @@ def _starting_causes(before: Explanation) -> tuple[Member, ...]:
     return (*members, *((cause, cause.variants[0]) for cause in tilts))
 
 
-def build_fit(
-    source: RowSource, rows: Rows, prepared: PreparedRecording
-) -> GaussNewton:
-    """Set up the fit of some rows: causes, turns and nominal state."""
+def build_fit(prepared: PreparedRecording) -> GaussNewton:
+    """Set up the fit of a recording's rows: causes, turns and nominal state."""
+    source, rows = prepared.source, prepared.rows
     about = source.about
     swayed = any(t.effect.kind == "motion" for t in prepared.spectral_lines)
     turned = bool(about.positions) and not swayed  # a base that rocks turns it as well
-    held = np.unique(rows.x.position)
-    common = np.array([rows.window_error[rows.x.position == p][0] for p in held])
     nominal = nominal_state(about, int(rows.x.position.max()) + 1, prepared)
     unit = np.abs(nominal.scale)
     dictionary = Dictionary(
-        rows.x, rows.used, times_since_turn(source, rows), common, unit, turned,
-        Wander.of(rows, unit), rows.session_error,
+        rows.x, rows.used, times_since_turn(source, rows), rows.error_by_window, unit,
+        turned, Wander.of(rows, unit), rows.session_error,
     )  # fmt: skip
     dictionary.unfitted = tuple(factory_error_groups(dictionary, about, prepared))
     dictionary.add_instants(change_points(rows).tolist())

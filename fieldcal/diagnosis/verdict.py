@@ -78,7 +78,7 @@ def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
     odd = _impossible_facts(explanation)
     verdict = _verdict(explanation, effects, strange, odd)
     # positions are counted as held up to here, and as listed in session.toml from here
-    indices_in_file = explanation.prepared.source.about.indices_in_file
+    indices_in_file = explanation.source.about.indices_in_file
 
     def counted(one: Mismatch) -> Mismatch:
         return replace(one, positions=tuple(sorted(indices_in_file(one.positions))))
@@ -194,7 +194,7 @@ def _impossible_facts(explanation: Explanation) -> list[str]:
     Either means that the description of the recording is wrong.
     """
     calibration = calibration_of_set(explanation, explanation.best.set)
-    nominal = explanation.prepared.source.about.nominal
+    nominal = explanation.source.about.nominal
     values = implausible_values(
         tuple(calibration),
         np.array([value for value, _, _ in calibration.values()]),
@@ -210,7 +210,7 @@ def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
 
     Turns during which faults of samples were found are left out.
     """
-    source, faults = explanation.prepared.source, explanation.prepared.checked.faults
+    source, faults = explanation.source, explanation.prepared.checked.faults
     t, windows = source.block.t, window_bounds(source.block, source.about)
     wrong = [f for _, f in faults if {f.channel, *f.channels} & {"t", *CHANNELS[GYR]}]
     out = []
@@ -284,7 +284,7 @@ def _undetermined(explanation: Explanation) -> list[str]:
 
 def _warnings(explanation: Explanation) -> tuple[str, ...]:
     out = list(explanation.prepared.checked.unused)
-    block = explanation.prepared.source.block
+    block = explanation.source.block
     out += dead_band_messages(block, explanation.rows.y)
     numbers = calibration_of_set(explanation, explanation.best.set)
     for name, first in (("accelerometers", 0), ("gyroscopes", 3)):

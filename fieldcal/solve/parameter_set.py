@@ -104,9 +104,8 @@ class ParameterSet(Dictionary):
     ) -> None:
         self.options, self.cut = wanted, np.array(cut, dtype=float)
         self.sign = _mean_signs(rows, self.cut)
-        held = np.unique(rows.x.position)
-        common = np.array([rows.window_error[rows.x.position == p][0] for p in held])
-        wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
+        common = rows.error_by_window
+        wander = Wander.of(rows, unit) if len(rows.x) > len(common) else Wander.none()
         super().__init__(
             rows.x, rows.used, since, common, unit, turns, wander, rows.session_error
         )

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
-from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
+from fieldcal.core.samples import Array
+from fieldcal.model.evidence.eliminated import evidence_gains
 from fieldcal.model.evidence.sets import Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
 from fieldcal.solve.explanations import WeightedExplanation, has_equation
@@ -118,7 +118,7 @@ def _scores(sets: Sets, members: tuple[Member, ...], member: Member) -> Array:
     """
     others, own = member[0].variants, member[1]
     every = np.unique(np.concatenate([g.columns for g in others]))
-    rest = _without_columns(sets, members, own.columns)
+    rest = sets.evaluate(members).state.without(own.columns)
     inner, rhs = rest.schur_complement(every, np.ones(len(every)))
     alone = np.diag(rest.rows.matrix(every, every))
     beside = [m for m in members if m[0].key != member[0].key]
@@ -138,11 +138,3 @@ def _scores(sets: Sets, members: tuple[Member, ...], member: Member) -> Array:
         summed = np.logaddexp.reduce(gain + LOG_DENSITY, axis=1)
         score[alike] += np.where(known, gain[:, UNIT_INDEX], summed)
     return score
-
-
-def _without_columns(sets: Sets, members: tuple[Member, ...], own: Index) -> Eliminated:
-    """A set without some columns, with the instability of windows unchanged."""
-    full = sets.evaluate(members)
-    kept = ~np.isin(full.state.columns, own)
-    rows = sets.gram_at(full.sizes.instability)
-    return Eliminated.of(rows, full.state.columns[kept], full.state.prior_sigma[kept])

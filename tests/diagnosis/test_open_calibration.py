@@ -34,9 +34,7 @@ def test_the_simulation_is_compared_with_a_calibration_that_a_device_can_have(
     block = recorded(LOUD, held, seed=seed)
     session = Session.open(write_session(tmp_path / "alike", block, held))
     found = prepare_recording(session.block, session.about)
-    fitted = fit_calibration_only(
-        build_fit(found.source, found.rows, found), found.rows
-    )
+    fitted = fit_calibration_only(build_fit(found), found.rows)
     d = fitted.dictionary
     bias = fitted.set.state.columns == d.bias + 1
     assert np.abs(fitted.estimate[d.bias + 1]) < 3 * 2.8

@@ -28,7 +28,7 @@ GROUP_UNITS = {
 
 def calibration_groups(explanation: Explanation) -> dict[str, CalibrationGroup]:
     """Groups of the calibration that the recording determines, in output units."""
-    about = explanation.prepared.source.about
+    about = explanation.source.about
     nominal, gauge = about.nominal, about.gauge
     found = averaged_calibration(explanation)
     out = {}
@@ -69,7 +69,7 @@ def impossible_turn_scales(explanation: Explanation) -> dict[str, str]:
     is not what happened.
     """
     found = turn_scale_factors(explanation.best.set, explanation.inferred.fit.nominal)
-    about = explanation.prepared.source.about.nominal
+    about = explanation.source.about.nominal
     nominal = Nominal(**{k: tuple(v.tolist()) for k, v in about.items()})
     return {
         name: sentence
@@ -148,7 +148,7 @@ def calibration_changes(explanation: Explanation, less: Set) -> dict[str, Quanti
     not determine are absent
 
     """
-    gauge = explanation.prepared.source.about.gauge
+    gauge = explanation.source.about.gauge
     now, before = (
         calibration_of_set(explanation, s) for s in (explanation.best.set, less)
     )

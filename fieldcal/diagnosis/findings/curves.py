@@ -25,7 +25,7 @@ def residual_curves(
     then: ModelResiduals,
 ) -> Iterator[Curve]:
     """One curve for each channel and covariate of the mismatches in the windows."""
-    source = explanation.prepared.source
+    source = explanation.source
     start = source.thermometer.start_c
     done = set()
     for m in mismatch:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,7 +58,7 @@ def remove_cause(explanation: Explanation, standing: ProbableCause) -> CauseRemo
     """Remove a cause, and calculate what its columns had explained."""
     best = explanation.best
     less = explanation.posterior.without(standing.name)
-    reduced = FittedSet(best.rows, best.dictionary, best.linear, best.values, less)
+    reduced = replace(best, set=less)
     residual = reduced.residual(reduced.deterministic_estimate)
     now = best.squares_of(best.residual(best.deterministic_estimate))
     turned = _squares_of_turns(explanation, reduced) - _squares_of_turns(
@@ -256,8 +256,8 @@ def held_out_rms_gain(
 ) -> float:
     """Part of the held-out rms that is removed, in the channel with the most effect."""
     best, turned = explanation.best, explanation.inferred.turn_rows
-    reduced = FittedSet(best.rows, best.dictionary, best.linear, best.values, lost.set)
     if shows_mainly_in_turns(lost):
+        reduced = replace(best, set=lost.set)
         without = root_mean_square(held_out_turn_residuals(reduced, turned))
         return float(1 - root_mean_square(explanation.turns_held_out) / without)
     ahead = rms_over_parts(best.rows, explanation.held_out.residual([lost.set]))

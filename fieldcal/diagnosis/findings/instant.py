@@ -29,7 +29,7 @@ def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, f
     """Instant of a change, s of device time, and its standard uncertainty."""
     _, group = member
     (at,) = group.shape.values()
-    rows, block = explanation.rows, explanation.prepared.source.block
+    rows, block = explanation.rows, explanation.source.block
     known = _fitted_changes(explanation, member)
     scale, before = explanation.state.scale, dict.fromkeys(group.shape, -np.inf)
     jump = _change_of_outputs(rows.x, scale, known)
@@ -40,7 +40,7 @@ def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, f
     part = slice(*np.searchsorted(block.t, [low, np.nextafter(high, np.inf)]))
     t, six = block.t[part], block.six[part]
     row = np.clip(np.searchsorted(rows.span[:, 1], t), 0, len(rows.x.t) - 1)
-    held = _at_rest(explanation, t)[:, None] & explanation.prepared.source.usable[part]
+    held = _at_rest(explanation, t)[:, None] & explanation.source.usable[part]
     z = np.where(held, six - plain[row], np.nan)
     noise = np.where(rows.noise > 0, rows.noise, np.inf)
     squares, edges = _squares(z, change[row], noise), np.concatenate([t, [high]])

@@ -93,7 +93,7 @@ def time_span(
     explanation: Explanation, positions: Sequence[int]
 ) -> tuple[float, float]:
     """Device time from the first to the last sample of some positions, s."""
-    source = explanation.prepared.source
+    source = explanation.source
     windows = window_bounds(source.block, source.about)[list(positions)]
     t = source.block.t
     return float(t[windows[:, 0].min()]), float(t[windows[:, 1].max() - 1])
@@ -117,7 +117,7 @@ def _of_turns(
     out = squares > max(thresholds.STANDS_OUT**2, 0.05 * squares.max())
     contributing = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
     places = tuple(sorted({p for t in contributing for p in t.positions}))
-    source = explanation.prepared.source
+    source = explanation.source
     windows = window_bounds(source.block, source.about)
     t = source.block.t
     gaps = [

@@ -100,7 +100,8 @@ def fit_recorded_samples(block: Block, explanation: Explanation) -> FittedSet:
     # rows of the same kind as before: by-hand or not is not decided again
     in_hand = prepared.rows.hand_angle.any()
     rows = rows_of_recording(source) if in_hand else reduce_to_rows(source)
-    return fit_calibration_only(build_fit(source, rows, prepared), rows)
+    fit = build_fit(replace(prepared, source=source, rows=rows))
+    return fit_calibration_only(fit, rows)
 
 
 def most_different_triad(one: ModelResiduals, other: ModelResiduals) -> int:

@@ -73,6 +73,11 @@ class Eliminated:
         places = [int(np.flatnonzero(self.columns == c)[-1]) for c in columns]
         return np.array(places, dtype=np.intp)
 
+    def without(self, columns: Index | list[int]) -> Eliminated:
+        """The set without some columns, the others with the same prior sizes."""
+        kept = ~np.isin(self.columns, columns)
+        return Eliminated.of(self.rows, self.columns[kept], self.prior_sigma[kept])
+
     @cached_property
     def inverse(self) -> Array:
         """Posterior covariance S (I + S G S)^-1 S, (a, a)."""

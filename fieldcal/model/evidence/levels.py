@@ -22,7 +22,8 @@ is (1) of `eliminated`. After the elimination of the set, the further columns ha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,8 +35,7 @@ MAX_NUMBERS = 4_000_000
 """Largest number of table elements that are calculated at once: 30 MB."""
 
 
-@dataclass(frozen=True, slots=True)
-class InstabilityScan:
+class InstabilityScan(NamedTuple):
     """A set, eliminated at each of n instabilities.
 
     Attributes
@@ -100,11 +100,8 @@ def scan_instabilities(
         total = common + np.swapaxes(white, 1, 2) @ white  # (1)
         eliminated = _eliminate(total, sizes[part], further.shape)
         score = eliminated.score - 0.5 * (log_det + still.log_det)
-        parts.append(replace(eliminated, score=score))
-    names = InstabilityScan.__slots__
-    return InstabilityScan(
-        *(np.concatenate([getattr(p, n) for p in parts]) for n in names)
-    )
+        parts.append(eliminated._replace(score=score))
+    return InstabilityScan(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> Mask:

@@ -49,7 +49,7 @@ class HeldOut:
         self.fold = folds(fitted.dictionary)
         columns = _columns(self.dictionary, sets) | (fitted.values != 0)
         self.columns = np.flatnonzero(columns)
-        self.linear = [_select_columns(part, columns) for part in fitted.linear]
+        self.linear = [part.select_columns(columns) for part in fitted.linear]
         self._rest: dict[int, Sets | None] = {}
 
     def residual(self, sets: Sequence[Set]) -> Array:
@@ -73,7 +73,7 @@ class HeldOut:
             places = d.window_positions[np.isin(d.window_positions, d.x.position[left])]
             if len(d.window_positions) >= MIN_WINDOWS:
                 step[d.rotations_of(places)] = 0.0
-            rows = [_select_rows(p, left[p.rows]) for p in self.linear]
+            rows = [p.select_rows(left[p.rows]) for p in self.linear]
             _predict(out, rows, step, chosen, d)
         return out
 
@@ -127,7 +127,7 @@ class HeldOut:
         """Sets over the rows without a part; None if a channel has no others."""
         if i not in self._rest:
             left = self.fold == i
-            rest = [_select_rows(part, ~left[part.rows]) for part in self.linear]
+            rest = [part.select_rows(~left[part.rows]) for part in self.linear]
             values, d = self.fitted.values, self.dictionary
             determined = all(len(part.white) for part in rest)
             rows = gram(rest, d, values, (), self.columns) if determined else None
@@ -152,7 +152,7 @@ def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Arr
     """Whitened held-out residuals of turns, from the windows and the other turns."""
     d, out = fitted.dictionary, []
     columns = _columns(d, [fitted.set]) | (fitted.values != 0)
-    linear = [_select_columns(part, columns) for part in fitted.linear]
+    linear = [part.select_columns(columns) for part in fitted.linear]
     for i in range(min(len(turns), MAX_FOLDS)):
         left = turns[i::MAX_FOLDS]
         kept = [t for t in turns if all(t is not other for other in left)]
@@ -197,21 +197,6 @@ def _columns(d: Dictionary, sets: Sequence[Set]) -> Mask:
         out[candidate.state.columns] = True
     out[d.rotations] = True
     return out
-
-
-def _select_columns(part: LinearRows, columns: Mask) -> LinearRows:
-    kept = columns[part.columns]
-    return LinearRows(
-        part.channel, part.rows, part.window, part.weight,
-        part.columns[kept], part.design[:, kept], part.white,
-    )  # fmt: skip
-
-
-def _select_rows(part: LinearRows, kept: Mask) -> LinearRows:
-    return LinearRows(
-        part.channel, part.rows[kept], part.window[kept], part.weight[kept],
-        part.columns, part.design[kept], part.white[kept],
-    )  # fmt: skip
 
 
 def _predict(

@@ -61,6 +61,12 @@ class Rows:
         """Means that can be used, (n, 6)."""
         return np.isfinite(self.y) & np.isfinite(self.sd)
 
+    @property
+    def error_by_window(self) -> Array:
+        """Error that all rows of a window share, of each position held, (p, 6)."""
+        first = np.unique(self.x.position, return_index=True)[1]
+        return self.window_error[first]
+
     def without(self, left: Mask) -> Rows:
         """The rows with those marked in `left` (n,) made unusable."""
         return replace(self, sd=np.where(left[:, None], np.nan, self.sd))

@@ -30,7 +30,8 @@ from scipy.fft import dct, idct, prev_fast_len
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index, Mask
-from fieldcal.model.rows.reference import GAP_INTERVALS, MIN_CHANNEL_SAMPLES, Reference
+from fieldcal.model.rows.knots import RESTART_INTERVALS
+from fieldcal.model.rows.reference import MIN_CHANNEL_SAMPLES, Reference
 from fieldcal.model.rows.response import Response
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
@@ -280,7 +281,7 @@ def rows_in_motion(
     good &= reference.covers(alignment.reference_time(block.t), margin)
     kept = np.flatnonzero(good)
     step = float(np.median(np.diff(block.t)))
-    broken = (np.diff(block.t[kept]) > GAP_INTERVALS * step) | (np.diff(kept) > 1)
+    broken = (np.diff(block.t[kept]) > RESTART_INTERVALS * step) | (np.diff(kept) > 1)
     length = max(int(stretch_s / step / per_row), 1)
     length = prev_fast_len(length, real=True)  # a prime one costs five times as much
     stretches = [

@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model.rows.averages import Rows, average_rows
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.noise import rounding_sigma, shared_rounding_sigma
 from fieldcal.model.rows.row_source import RowSource
+from fieldcal.model.rows.turntable import unknown_earth_rate
 from fieldcal.model.rows.window_bounds import block_bounds, window_bounds
 from fieldcal.physics.experience import Experience
 from fieldcal.windows.dead_band import dead_bands, error_of_means
@@ -143,7 +143,7 @@ def _with_errors_of_site(
     # the direction of the Earth's rate is unknown in device axes, except in a device
     # that was never turned (bias contains it) or whose gyroscopes measure it
     free = x.earth_unseen & turned
-    earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
+    earth = unknown_earth_rate(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
     return off
 
@@ -200,6 +200,6 @@ def rows_of_means(source: RowSource, sigma: Array) -> Rows:
         x = replace(x, t=same, since_start=same)
     x = replace(x, since_turn=np.full(len(held), np.inf))
     off = np.zeros_like(out.sd)
-    earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
-    off[~x.oriented & (len(held) > 1), 3:] = earth
+    unknown = ~x.oriented & (len(held) > 1)
+    off[unknown, 3:] = unknown_earth_rate(source.about.nominal["gyr_scale"])
     return replace(out, x=x, window_error=off)

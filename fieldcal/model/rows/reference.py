@@ -15,10 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
 from fieldcal.core.samples import Array, Block, Index, Mask
-from fieldcal.model.rows.knots import even_times, hermite_spline
-
-GAP_INTERVALS = 3.5
-"""Intervals between samples from which there is a gap."""
+from fieldcal.model.rows.knots import RESTART_INTERVALS, even_times, hermite_spline
 
 MIN_CHANNEL_SAMPLES = 8
 """Samples of a channel from which a reference has it."""
@@ -110,4 +107,5 @@ class Reference:
         """Which instants, s, are inside the reference by a margin and in no gap."""
         inside = (s > self.start + margin) & (s < self.end - margin)
         after = np.clip(np.searchsorted(self.t, s), 1, len(self.t) - 1)
-        return inside & (self.t[after] - self.t[after - 1] < GAP_INTERVALS * self.step)
+        apart = self.t[after] - self.t[after - 1]
+        return inside & (apart < RESTART_INTERVALS * self.step)

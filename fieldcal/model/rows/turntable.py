@@ -51,6 +51,15 @@ EARTH_RATE_SIGMAS = 5.0
 """Standard deviations by which something may seem larger than the Earth's rate."""
 
 
+def unknown_earth_rate(scale: Array | Sequence[float]) -> Array:
+    """Error of gyroscopes by the Earth's rate in unknown orientations, (3,) outputs.
+
+    One standard deviation, for scale factors (3,).
+    """
+    size: Array = EARTH_RATE / np.sqrt(3) * np.abs(np.asarray(scale))
+    return size
+
+
 @dataclass(frozen=True, slots=True)
 class RotatingEarthRate:
     """The part of the Earth's rate that rotates with a table, in one window.

@@ -27,7 +27,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -136,8 +136,7 @@ def _gains_of_equal_widths(
         yield gain, (i, j), sizes
 
 
-@dataclass(frozen=True, slots=True)
-class _SeparateGroups:
+class _SeparateGroups(NamedTuple):
     """n groups of k columns each, as if each were added to the set without the others.
 
     Attributes
@@ -158,7 +157,7 @@ class _SeparateGroups:
     profile: Array
 
     @classmethod
-    def of(cls, inner: Array, rhs: Array, at: Index) -> Self:
+    def of(cls, inner: Array, rhs: Array, at: Index) -> _SeparateGroups:
         """Groups with columns `at` (n, k), of M and b of the columns of all groups."""
         own, right = inner[at[:, :, None], at[:, None, :]], rhs[at]
         strength, axes = np.linalg.eigh(own)
@@ -172,9 +171,9 @@ class _SeparateGroups:
         profile = gains_from_eigenvalues(strength, along**2) + LOG_DENSITY
         return cls(at, own, right, strength, axes, along, profile)
 
-    def at_numbers(self, numbers: Index | Mask) -> Self:
+    def at_numbers(self, numbers: Index | Mask) -> _SeparateGroups:
         """The groups of these numbers, which may repeat."""
-        return type(self)(*(getattr(self, name)[numbers] for name in self.__slots__))
+        return _SeparateGroups._make(values[numbers] for values in self)
 
 
 class _GroupsAfterOthers:

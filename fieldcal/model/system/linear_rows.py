@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +32,19 @@ class LinearRows:
     columns: Index
     design: Array
     white: Array
+
+    def select_rows(self, kept: Mask) -> LinearRows:
+        """Some of its rows, by (r,)."""
+        rows, window, weight = self.rows[kept], self.window[kept], self.weight[kept]
+        design, white = self.design[kept], self.white[kept]
+        return LinearRows(
+            self.channel, rows, window, weight, self.columns, design, white
+        )
+
+    def select_columns(self, columns: Mask) -> LinearRows:
+        """The rows with only some columns, (all,) of the dictionary."""
+        kept = columns[self.columns]
+        return replace(self, columns=self.columns[kept], design=self.design[:, kept])
 
     @property
     def starts(self) -> Index:

@@ -65,7 +65,7 @@ def test_the_state_stays_where_the_set_does() -> None:
 def test_how_a_position_lies_moves_no_closure() -> None:
     """It is read from accelerometers, whatever they couple, bend or are biased by."""
     one = prepared(88_000_045)
-    own = build_fit(one.source, one.rows, one)
+    own = build_fit(one)
     there = {c.key: c for c in own.dictionary.causes}
     state, values, _ = own.settle(own.nominal, np.zeros(own.dictionary.width), ())
     members = tuple((there[key], there[key].variants[0]) for key in sorted(EVERY))

@@ -122,5 +122,4 @@ def printed_forces(observations: Observations) -> Array:
     """Forces by (5) as printed, with its error, in device axes, (n, 3) m/s^2."""
     f = observations.forces @ observations.mounting.T
     f[:, 2] *= -1.0
-    printed: Array = f @ observations.mounting
-    return printed
+    return f @ observations.mounting

@@ -154,8 +154,7 @@ class Observations:
     @property
     def forces(self) -> Array:
         """Specific force at rest in device axes, (n, 3) m/s^2."""
-        forces: Array = specific_forces(self.positions, self.gravity) @ self.mounting
-        return forces
+        return specific_forces(self.positions, self.gravity) @ self.mounting
 
     @property
     def known_latitude(self) -> float:
@@ -177,8 +176,7 @@ class Observations:
     @property
     def rates(self) -> Array:
         """Known rates of a rate table in device axes, (n, 3) rad/s; 0 at rest."""
-        rates: Array = table_rates(self.positions) @ self.mounting
-        return rates
+        return table_rates(self.positions) @ self.mounting
 
     def _check_shapes(self, n: int) -> None:
         shapes = {

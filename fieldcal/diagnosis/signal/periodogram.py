@@ -280,8 +280,7 @@ def _in_bursts(t: Array, rate: float) -> bool:
 
 
 def _squared_magnitude(spectrum: Complex) -> Array:
-    square: Array = spectrum.real**2 + spectrum.imag**2
-    return square
+    return spectrum.real**2 + spectrum.imag**2
 
 
 def _median_floor(power: Array) -> Array:
@@ -325,5 +324,4 @@ def _floor_on_slope(power: Array, floor: Array) -> Array:
     beside = np.where(np.isfinite(above), np.maximum(below, above), below)
     beside = np.where(np.isfinite(below), beside, above)
     falls = (beside > STEEP_RATIO * floor) & (below > SLOPE_POWER_SHARE * power)
-    level: Array = np.where(falls, np.minimum(beside, power), floor)
-    return level
+    return np.where(falls, np.minimum(beside, power), floor)

@@ -124,8 +124,7 @@ class Group:
 
     def prior_sigma(self, v: float) -> Array:
         """Prior standard deviation of each column at size v, (k,)."""
-        sigma: Array = v * self.typical
-        return sigma
+        return v * self.typical
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -110,8 +110,7 @@ class ColumnTable:
     def rotations_of(self, positions: ArrayLike) -> Index:
         """Columns of the small rotations of some positions, two of each, (2 m,)."""
         first = 2 * np.atleast_1d(positions)[:, None]
-        at: Index = (self.small_rotation + first + [0, 1]).ravel()
-        return at
+        return (self.small_rotation + first + [0, 1]).ravel()
 
     def _inside(self, x: Experience) -> Array:
         inside: Array = np.equal.outer(x.position, self.window_positions).astype(float)

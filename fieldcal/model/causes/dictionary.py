@@ -112,8 +112,7 @@ class Dictionary(ColumnTable):
 
     def instability_sigma(self, instability: Sequence[int]) -> Array:
         """Standard deviation (7,) of instabilities, from indices in `priors.SIZES`."""
-        sigma: Array = priors.SIZES[list(instability)] * self.typical_instability
-        return sigma
+        return priors.SIZES[list(instability)] * self.typical_instability
 
     def independent_copy(self) -> Self:
         """A copy to which columns can be added without changing this one."""

@@ -118,8 +118,7 @@ def separable_basis(
             product = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
             parts.append(product.reshape(len(view.x), 6, -1))
         gain = effect.gain(view.state.scale)[:, None]
-        columns: Array = np.concatenate(parts, axis=2) * gain
-        return columns
+        return np.concatenate(parts, axis=2) * gain
 
     return General(effect.id, of)
 

@@ -69,16 +69,14 @@ class CourseSpan:
         part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
         few, at = np.unique(x.lasts.round(6), return_inverse=True)
         mean = np.sinc(np.outer(few / (2 * self.length), k))[at]
-        out: Array = np.cos(np.pi * np.outer(part, k)) * mean
-        return out
+        return np.cos(np.pi * np.outer(part, k)) * mean
 
     def fading(self, x: Experience) -> Array:
         """Force along each axis, in gravities, times polynomials of time, (n, 12)."""
         part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
         steps = np.polynomial.legendre.legvander(2 * part - 1, TIME_POWERS)[:, 1:]
         f = x.f / x.gravity
-        out: Array = (f[:, :, None] * steps[:, None, :]).reshape(len(x), -1)
-        return out
+        return (f[:, :, None] * steps[:, None, :]).reshape(len(x), -1)
 
     def temperature(self, x: Experience) -> Array:
         """Powers 1 to 4 of the temperature, as a part of its range, (n, 4)."""
@@ -123,8 +121,7 @@ def joints(x: Experience) -> Array:
     """Products of harmonics of both joints' angles."""
     # the sines and cosines of the first two harmonics of each angle
     first, second = (_angle(a)[:, [0, 1, 4, 5]] for a in (x.alpha, x.beta))
-    out: Array = (first[:, :, None] * second[:, None, :]).reshape(len(x), -1)
-    return out
+    return (first[:, :, None] * second[:, None, :]).reshape(len(x), -1)
 
 
 def _angle(angle: Array) -> Array:

@@ -117,8 +117,7 @@ class Wander:
         # rows have few different lengths, except for rounding errors of their times
         few, at = np.unique(length.round(6), return_inverse=True)
         walks = q**2 * _residual_of_walk(self.length, few, count)
-        out: Array = (walks + a**2 * _residual_of_flicker(self.length, few, count))[at]
-        return out
+        return (walks + a**2 * _residual_of_flicker(self.length, few, count))[at]
 
     def residual_covariance(
         self, t: Array, length: Array, channels: Sequence[int] = range(6)
@@ -173,5 +172,4 @@ def _residual_of_flicker(whole: float, length: Array, count: int) -> Array:
 
 def _means(z: Array, k: Index) -> Array:
     """Means m_k of cosines over intervals, (n, k)."""
-    out: Array = np.sinc(np.multiply.outer(z, k) / (2 * np.pi))
-    return out
+    return np.sinc(np.multiply.outer(z, k) / (2 * np.pi))

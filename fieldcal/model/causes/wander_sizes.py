@@ -89,8 +89,7 @@ class Differences(NamedTuple):
         variance = self.white + np.multiply.outer(squared_sizes, unit_variance)
         median = np.median(self.squares / variance, axis=1)
         ratio = np.maximum(median / CHI2_MEDIAN, MIN_RATIO)
-        out: Array = -self.independent / 2 * (np.log(ratio) / MEDIAN_LOG_SCATTER) ** 2
-        return out
+        return -self.independent / 2 * (np.log(ratio) / MEDIAN_LOG_SCATTER) ** 2
 
 
 def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
@@ -209,14 +208,12 @@ def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
 
 def _flicker_structure(x: Array) -> Array:
     """D of (3) for a = 1: two means x of their lengths apart."""
-    out: Array = (_squared_ln(x + 1) + _squared_ln(x - 1)) / 2 - _squared_ln(x)  # (3)
-    return out
+    return (_squared_ln(x + 1) + _squared_ln(x - 1)) / 2 - _squared_ln(x)  # (3)
 
 
 def _squared_ln(x: Array) -> Array:
     """x^2 ln x; 0 at x = 0."""
-    out: Array = x**2 * np.log(np.maximum(x, 1e-12))
-    return out
+    return x**2 * np.log(np.maximum(x, 1e-12))
 
 
 def _later_half(rows: Rows, ahead: int) -> Index:
@@ -225,5 +222,4 @@ def _later_half(rows: Rows, ahead: int) -> Index:
     at = np.flatnonzero(position[ahead:] == position[:-ahead])
     first = np.searchsorted(position, position[at])
     count = np.searchsorted(position, position[at], side="right") - first
-    out: Index = at[2 * (at - first) >= count - 1]
-    return out
+    return at[2 * (at - first) >= count - 1]

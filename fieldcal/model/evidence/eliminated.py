@@ -81,8 +81,7 @@ class Eliminated:
     @cached_property
     def inverse(self) -> Array:
         """Posterior covariance S (I + S G S)^-1 S, (a, a)."""
-        out: Array = self.half.T @ self.half
-        return out
+        return self.half.T @ self.half
 
     def schur_complement(self, columns: Index, typical: Array) -> tuple[Array, Array]:
         """M and T b' of further columns after elimination, in typical sizes."""

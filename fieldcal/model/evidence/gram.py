@@ -171,8 +171,7 @@ class WeightedGram:
     def rhs(self, columns: Index | None) -> Array:
         """Phi^T R^-1 (y - h) of some columns, or of all."""
         at = slice(None) if columns is None else self.gram.index[columns]
-        out: Array = self.gram.rhs[at] + self.white[:, at].T @ self.residual
-        return out
+        return self.gram.rhs[at] + self.white[:, at].T @ self.residual
 
     def diagonals(self, blocks: Sequence[Index]) -> list[Array]:
         """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each."""

@@ -111,8 +111,7 @@ def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> Mask:
         own |= gram.closure_errors[:, :, bent].any(axis=2)
     turned = gram.free_rotations.any(axis=2)
     own |= turned & np.any(turned & own, axis=1)[:, None]
-    out: Mask = own & (gram.info > 0)
-    return out
+    return own & (gram.info > 0)
 
 
 def _joint_gram(rows: WeightedGram, columns: Index) -> Array:

@@ -173,8 +173,7 @@ def folds(d: Dictionary) -> Index:
     """Number of the part that each row is left out in, (n,)."""
     index = np.searchsorted(d.window_positions, d.x.position)
     if len(d.window_positions) >= MIN_WINDOWS:
-        out: Index = (index % MAX_FOLDS).astype(np.intp)
-        return out
+        return (index % MAX_FOLDS).astype(np.intp)
     out = np.zeros(len(index), dtype=np.intp)
     for p in d.window_positions:
         for i, part in enumerate(

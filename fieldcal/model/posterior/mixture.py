@@ -305,5 +305,4 @@ def covariance_of_means(means: Array, weight: Array) -> Array:
     It is added to the mean of their covariances (law of total covariance).
     """
     off = means - weight @ means
-    out: Array = (weight[:, None] * off).T @ off
-    return out
+    return (weight[:, None] * off).T @ off

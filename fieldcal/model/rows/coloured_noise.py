@@ -152,5 +152,4 @@ def _smooth(raw: Array, free: Array, apart: Array, about: Array | None) -> Array
         level = level - step
         if np.abs(step).max() < CONVERGED:
             break
-    out: Array = level + np.diag(np.linalg.inv(bend)) / 2
-    return out
+    return level + np.diag(np.linalg.inv(bend)) / 2

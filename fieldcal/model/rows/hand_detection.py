@@ -99,8 +99,7 @@ def noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array 
     )
     loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
     quiet = np.argsort(loud)[: max(round(MIN_QUIET_SHARE * len(pieces)), 1)]
-    beside: Array = np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
-    return beside
+    return np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
 
 
 def tremor_rms(values: Array, length: float, white: Array) -> Array:

@@ -171,5 +171,4 @@ def turned_force(force: Array, angle: Array) -> Array:
     `angle` is the standard deviation about each, (3,) rad.
     """
     across = np.cross(np.eye(3), force) * angle[:, None]
-    out: Array = across.T @ across
-    return out
+    return across.T @ across

@@ -71,8 +71,7 @@ class Alignment:
 
     def reference_time(self, t: Array) -> Array:
         """Instants of the recording by the reference's clock, s."""
-        out: Array = t - self.delay + self.drift * (t - self.middle)  # (1)
-        return out
+        return t - self.delay + self.drift * (t - self.middle)  # (1)
 
 
 @dataclass(frozen=True, slots=True)

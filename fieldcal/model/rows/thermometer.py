@@ -201,5 +201,4 @@ def _slope_of_run(t: Array, y: Array, weight: Array, half: float) -> Array:
     left = moments[:, np.add.outer(np.arange(3), np.arange(3))] / scale
     left += RIDGE * left[:, :1, :1] * np.eye(3)
     coefficients = np.linalg.solve(left, right / half ** np.arange(3)[:, None])
-    out: Array = coefficients[:, 1, 0] / half
-    return out
+    return coefficients[:, 1, 0] / half

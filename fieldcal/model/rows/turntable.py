@@ -210,8 +210,7 @@ def fit_rotating_earth_rate(
 def _unseen_rate_covariance(axis: Array, turned: float) -> Array:
     """Covariance of the mean if nothing is subtracted, (2)."""
     size = 2 / 3 * EARTH_RATE**2 * min(0.5, 1 / max(turned, 1e-9) ** 2)
-    across: Array = size * (np.eye(3) - np.outer(axis, axis))
-    return across
+    return size * (np.eye(3) - np.outer(axis, axis))
 
 
 def _unit_vectors(axis: Array, angle: Array) -> Array:

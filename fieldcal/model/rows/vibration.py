@@ -128,8 +128,7 @@ def _never_changes(levels: Array, grain: Array) -> Mask:
     """
     still: Mask = levels == 0
     usual = [np.median(c[c > 0]) if (c > 0).any() else 0.0 for c in levels.T]
-    out: Mask = still & (np.array(usual) > grain)
-    return out
+    return still & (np.array(usual) > grain)
 
 
 def without_lines(piece: Array, rate_hz: float) -> Array:

@@ -56,8 +56,7 @@ def _window_offsets(d: Dictionary, fitted: Set, channels: Index) -> Array:
         columns, np.repeat(typical_unknown_sizes(d)[channels], len(d.window_positions))
     )
     inner.flat[:: len(columns) + 1] += 1 / priors.SIZES[-1] ** 2
-    offsets: Array = np.linalg.solve(inner, rhs).reshape(len(channels), -1).T
-    return offsets
+    return np.linalg.solve(inner, rhs).reshape(len(channels), -1).T
 
 
 def _proportional_group(

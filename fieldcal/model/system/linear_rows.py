@@ -49,8 +49,7 @@ class LinearRows:
     @property
     def starts(self) -> Index:
         """First row of each of its windows, (w,)."""
-        first: Index = np.flatnonzero(np.diff(self.window, prepend=-1))
-        return first
+        return np.flatnonzero(np.diff(self.window, prepend=-1))
 
     @property
     def windows(self) -> Index:
@@ -60,12 +59,10 @@ class LinearRows:
     @property
     def info(self) -> Array:
         """Inverse variance of the mean of each window, (w,)."""
-        total: Array = np.add.reduceat(self.weight**2, self.starts)
-        return total
+        return np.add.reduceat(self.weight**2, self.starts)
 
     def window_means(self, white: Array) -> Array:
         """Weighted mean of each window, (w, ...), of whitened rows (r, ...)."""
         weight = self.weight.reshape(-1, *[1] * (white.ndim - 1))
         total = np.add.reduceat(white * weight, self.starts, axis=0)
-        mean: Array = total / self.info.reshape(-1, *[1] * (white.ndim - 1))
-        return mean
+        return total / self.info.reshape(-1, *[1] * (white.ndim - 1))

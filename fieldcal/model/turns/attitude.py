@@ -29,8 +29,7 @@ def trapezoid_means(t: Array, values: Array, cut: Index) -> Array:
     """Means (k, ...) between indices cut (k + 1,) of values (n, ...) at instants t."""
     total = running_integral(t, values)
     length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
-    mean: Array = np.diff(total[cut], axis=0) / length
-    return mean
+    return np.diff(total[cut], axis=0) / length
 
 
 def interpolate_vectors(

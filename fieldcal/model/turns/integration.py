@@ -83,8 +83,7 @@ class Steps:
     @property
     def at(self) -> Array:
         """Instants of the edges, s."""
-        times: Array = self.t[self.edge]
-        return times
+        return self.t[self.edge]
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,5 +155,4 @@ def _angular_rates(leg: Leg, t: Array, known_errors: Array) -> Array:
     span = slice(max(first - n, 0), first + 2 * n)
     delayed = t + leg.delay
     measured = [np.interp(delayed, block.t[span], g) for g in block.gyr[span].T]
-    rate: Array = (np.stack(measured, axis=1) - leg.bias - known_errors) / leg.scale
-    return rate
+    return (np.stack(measured, axis=1) - leg.bias - known_errors) / leg.scale

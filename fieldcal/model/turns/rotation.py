@@ -35,8 +35,7 @@ def small_turns(t: Array, w: Array, edge: Index) -> Array:
         (np.diff(t)[:, None] * mean_rates(t, w))[: edge[-1]], edge[:-1], axis=0
     )
     coning = cross(w[edge[:-1]], w[edge[1:]])
-    turns: Array = total + np.diff(t[edge])[:, None] ** 2 / 12 * coning
-    return turns
+    return total + np.diff(t[edge])[:, None] ** 2 / 12 * coning
 
 
 def mean_rates(t: Array, w: Array) -> Array:

@@ -63,8 +63,7 @@ class StandingOutputs:
         kernel = np.ones(step_samples) / step_samples
         smooth = np.column_stack([np.convolve(c, kernel, "same") for c in at_value.T])
         inside = np.convolve(np.ones(len(at_value)), kernel, "same")
-        out: Array = smooth[edge] / inside[edge][:, None]
-        return out
+        return smooth[edge] / inside[edge][:, None]
 
     def closure_covariance(
         self, t: Array, gyr: Array, scale: Array, edge: Index, attitude: Array
@@ -96,8 +95,7 @@ class StandingOutputs:
 
     def _at_window_value(self, gyr: Array) -> Mask:
         """Whether each output (n, 3) has the value of the windows, (n, 3)."""
-        found: Mask = np.abs(gyr - self.value) < MAX_STEP_PART * self.step
-        return found
+        return np.abs(gyr - self.value) < MAX_STEP_PART * self.step
 
 
 def _run_factor(value: Array, length: Array) -> Array:

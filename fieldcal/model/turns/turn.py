@@ -106,8 +106,7 @@ class Turn:
         seconds = np.zeros(len(self.x.t))  # that each edge stands for, trapezoid rule
         seconds[:-1] += steps / 2
         seconds[1:] += steps / 2
-        out: Array = np.moveaxis(self.attitude, 2, 0) * seconds[:, None] / scale
-        return out
+        return np.moveaxis(self.attitude, 2, 0) * seconds[:, None] / scale
 
     def attitude_error(self, rate_error: Array) -> Array:
         """Attitude errors phi - u phi_T at the edges, (m + 1, 3, k) rad.

@@ -169,8 +169,7 @@ class TurnTracker:
         first_row = int(np.argmax(x.position == q))
         turn_end = x.t[first_row] - self.since[:, first_row]
         since = t - turn_end[:, None]
-        out: Array = np.where(since >= 0, since, np.inf)
-        return out
+        return np.where(since >= 0, since, np.inf)
 
     def _edges(
         self,
@@ -226,5 +225,4 @@ def other_gyro_errors(state: State, x: Experience, since: Array) -> Array:
     """
     terms = tuple(t for t in state.terms if not t.effect.lag(t.values).delay)
     outputs = replace(state, terms=terms).output(x, since)
-    out: Array = outputs[:, 3:] - state.bias[3:] - state.scale[3:] * x.w
-    return out
+    return outputs[:, 3:] - state.bias[3:] - state.scale[3:] * x.w

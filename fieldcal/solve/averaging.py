@@ -3,7 +3,7 @@
 The recording may show effects in addition to the requested parameters, with several
 possible explanations. Each explanation gives an estimate. The calibration is their
 mean, and its covariance includes their differences, (1) of `explanations`. Biases
-that change are stated for the end of the recording, (2) of `explanations`.
+that change are stated for the end of the recording, (1) of `end_values`.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def average_explanations(
 def _parameters_at_end(
     parameter_set: ParameterSet, mixture: Mixture, nominal: State
 ) -> tuple[Array, Array]:
-    """Parameters of one explanation at the end of the recording, (2)."""
+    """Parameters of an explanation at the end of the recording (`end_values`)."""
     picked, before = (
         parameter_matrix(parameter_set, mixture.columns),
         _nominal_values(parameter_set, nominal),

@@ -32,7 +32,8 @@ from fieldcal.solve.averaging import (
     parameter_matrix,
     select_determined,
 )
-from fieldcal.solve.explanations import WeightedExplanation, bias_scale_at_end
+from fieldcal.solve.end_values import bias_scale_at_end
+from fieldcal.solve.explanations import WeightedExplanation
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
 from fieldcal.solve.settling import settle_without_bad_windows

@@ -29,11 +29,8 @@ from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.averages import Rows
 from fieldcal.physics.effect import Effect
-from fieldcal.solve.explanations import (
-    WeightedExplanation,
-    bias_scale_at_end,
-    translate_explanations,
-)
+from fieldcal.solve.end_values import bias_scale_at_end
+from fieldcal.solve.explanations import WeightedExplanation, translate_explanations
 from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
 

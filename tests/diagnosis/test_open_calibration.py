@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from session_folders import places, recorded, write_session
 
-from fieldcal.diagnosis.explain import build_fit, fit_calibration_only
+from fieldcal.diagnosis.fit import build_fit, fit_calibration_only
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile

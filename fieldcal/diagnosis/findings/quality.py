@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import Explanation, build_fit, fit_calibration_only
+from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.agreement import ModelResiduals, root_mean_square
+from fieldcal.diagnosis.fit import build_fit, fit_calibration_only
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.posterior.held_out import (

@@ -10,7 +10,7 @@ channel by channel.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Self
 
@@ -18,7 +18,8 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import CLOSURE
+from fieldcal.model.causes.basis import Course
+from fieldcal.model.causes.cause import CLOSURE, Basis
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.gram import Gram
@@ -51,9 +52,69 @@ class System(ABC):
     def independent_copy(self) -> Self:
         """The same rows with a copy of the dictionary."""
 
+    @property
     @abstractmethod
+    def used(self) -> Mask:
+        """Rows with a value, by channel, (n, 6)."""
+
     def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
+        table_of, off = self._about(state)
+        asked = self._every_column() if wanted is None else wanted
+        out = [
+            self._whitened(
+                c,
+                np.concatenate([at for at, _ in parts]),
+                np.hstack([table for _, table in parts]),
+                off[:, c],
+            )
+            for c, parts in self._parts(table_of, asked).items()
+            if parts
+        ]
+        if wanted is None:
+            for part in out:
+                self.dictionary.shown[part.columns] |= self._shows(part)
+        return out
+
+    @abstractmethod
+    def _about(self, state: State) -> tuple[Callable[[Basis], Array], Array]:
+        """What evaluates a basis about a state; recorded less calculated, (n, 6)."""
+
+    @abstractmethod
+    def _whitened(
+        self, channel: int, columns: Index, table: Array, off: Array
+    ) -> LinearRows:
+        """Rows of a channel with columns (k,), of a table (n, k) and residuals (n,)."""
+
+    def _every_column(self) -> Mask:
+        """The columns of rows that are linearised with all of them."""
+        return np.ones(self.dictionary.width, dtype=bool)
+
+    def _shows(self, part: LinearRows) -> Mask:
+        """Whether each column of a channel exceeds the noise at typical size, (k,)."""
+        typical = self.dictionary.typical[part.columns]
+        shows: Mask = np.linalg.norm(part.design, axis=0) * typical > MIN_VISIBLE_SIGMAS
+        return shows
+
+    def _parts(self, table_of: Callable[[Basis], Array], wanted: Mask) -> Parts:
+        """Wanted columns with influence on each channel."""
+        parts: Parts = {c: [] for c in self.dictionary.observed.tolist()}
+        used = self.used
+        for first, end, basis in self.dictionary.basis_ranges():
+            at, kept = np.arange(first, end), wanted[first:end]
+            if not kept.any():
+                continue
+            table = table_of(basis)
+            if isinstance(basis, Course):
+                _append_course(parts, at, table, kept)
+                continue
+            if not kept.all():
+                at, table = at[kept], table[:, :, kept]
+            for c, channel_parts in parts.items():
+                shown = ((table[:, c] != 0.0) & used[:, c, None]).any(axis=0)
+                if shown.any():
+                    channel_parts.append((at[shown], table[:, c, shown]))
+        return parts
 
     def linearisation_error(self, state: State, other: State, step: Array) -> float:
         """Largest error of the rows of another state, linearised about a state.
@@ -68,7 +129,7 @@ class System(ABC):
         return np.zeros(2)
 
 
-def append_course(parts: Parts, at: Index, table: Array, kept: Mask) -> None:
+def _append_course(parts: Parts, at: Index, table: Array, kept: Mask) -> None:
     """Append the columns `at` of a `Course`, as far as they are `kept`, to `parts`."""
     width = table.shape[1]
     for c, channel_parts in parts.items():

@@ -20,7 +20,6 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.rows.hand_detection import tremor_rms
 from fieldcal.model.rows.row_source import RowSource
 
 WINDOW_EDGE_S = 10.0
@@ -63,6 +62,9 @@ def sway_variance(rate: Array, step: float) -> float:
     n = len(rate)
     if n < MIN_SAMPLES:
         return 0.0
+    angle = np.cumsum((rate - rate.mean(axis=0)) * step, axis=0)
+    line = np.linalg.qr(np.column_stack([np.ones(n), np.arange(n)]))[0]
+    psi = angle - line @ (line.T @ angle)
     white = (np.diff(rate, n=2, axis=0) ** 2).mean(axis=0) / 6
-    psi = tremor_rms(rate, n * step, np.sqrt(white / n))  # (2)
-    return float(psi.max() ** 2)
+    by_noise = white * step**2 * n / 15  # (2)
+    return float(np.maximum((psi**2).mean(axis=0) - by_noise, 0.0).max())

@@ -11,7 +11,8 @@ import pytest
 
 from benchmarks.hand_held.draws import GRAVITY, log
 from fieldcal.cli import main
-from fieldcal.diagnosis.explain import Explanation, build_fit, explain
+from fieldcal.diagnosis.explain import Explanation, explain
+from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes

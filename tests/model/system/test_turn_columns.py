@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.concealed import kinds
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.explain import build_fit
+from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary

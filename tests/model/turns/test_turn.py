@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import build_fit
+from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.basis import RowView
 from fieldcal.model.causes.cause import Group

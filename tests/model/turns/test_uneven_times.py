@@ -7,7 +7,7 @@ import pytest
 import strapdown
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import build_fit
+from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.turns.attitude import accelerations
 from fieldcal.model.turns.rotation import small_turns

@@ -272,13 +272,12 @@ def _undetermined(explanation: Explanation) -> list[str]:
     """Full names of parameters of the causes found that the rows do not determine."""
     out = []
     for cause in explanation.probable_causes:
-        effect = catalogue().get(cause.name)
-        if effect is None:
+        if cause.name not in catalogue():
             continue
         estimates = found_effects.parameter_estimates(explanation, cause)
         for _, group in cause.members:
-            names = [effect.params[j].name for j in group.params]
-            out += [f"{cause.name}.{n}" for n in names if n not in estimates]
+            missing = [n for n in group.names if n not in estimates]
+            out += [f"{cause.name}.{name}" for name in missing]
     return out
 
 

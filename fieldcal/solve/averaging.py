@@ -111,9 +111,8 @@ def parameter_matrix(parameter_set: ParameterSet, columns: Index) -> Array:
     """Derivative of the parameters by some columns, (k, c)."""
     picked = np.zeros((len(parameter_set.names), len(columns)))
     for i, name in enumerate(parameter_set.names):
-        picked[i, np.flatnonzero(columns == parameter_set.columns_for(name)[0])[0]] = (
-            1.0
-        )
+        own = parameter_set.column_by_name[name]
+        picked[i, np.flatnonzero(columns == own)[0]] = 1.0
         parameter = ParameterName.of(name)
         if parameter.sensor:
             scale, c = parameter.is_scale, parameter.channel
@@ -159,7 +158,7 @@ def select_determined(
         i
         for i, name in enumerate(parameter_set.names)
         if sigma[i] ** 2
-        < thresholds.DETERMINED * before[parameter_set.columns_for(name)[0]] ** 2
+        < thresholds.DETERMINED * before[parameter_set.column_by_name[name]] ** 2
         and sigma[i] < limits.get(group_of(name), np.inf)
     ]
     names = tuple(parameter_set.names[i] for i in known)

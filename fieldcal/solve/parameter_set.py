@@ -16,9 +16,9 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.calibration.lot_prior import LotPrior
-from fieldcal.calibration.names import TILTS, ParameterName, Tilt, group_of
+from fieldcal.calibration.names import TILTS, Tilt, group_of
 from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
-from fieldcal.core.samples import CHANNELS, Array, Index
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.model import priors
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Cause, Group
@@ -28,7 +28,6 @@ from fieldcal.model.causes.effect_causes import effect_group, factory_groups
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.averages import Rows
-from fieldcal.physics.effect import Effect
 from fieldcal.solve.end_values import bias_scale_at_end
 from fieldcal.solve.explanations import WeightedExplanation, translate_explanations
 from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
@@ -259,44 +258,27 @@ class ParameterSet(Dictionary):
 
     # -- places of the parameters
 
-    def columns_for(self, name: str) -> Index:
-        """Columns of a parameter by its full name; none if it is not in the set."""
-        parameter = ParameterName.of(name)
-        if parameter.sensor:
-            kind = "scale" if parameter.is_scale else "bias"
-            every = [c for g in self.always if g.cause == kind for c in g.columns]
-            first = self.scale if parameter.is_scale else self.bias
-            at = first + parameter.channel
-            return np.array([at] if at in every else [], dtype=np.intp)
+    @cached_property
+    def column_by_name(self) -> dict[str, int]:
+        """Column of each parameter by its full name."""
+        first, out = {"bias": self.bias, "scale": self.scale}, dict[str, int]()
+        for group in self.always:
+            for column in group.columns.tolist() if group.cause in first else ():
+                axis = CHANNELS[column - first[group.cause]][-1]
+                out[f"{group.part}_{group.cause}.{axis}"] = column
         for cause, group in self.base_members:
-            if cause.name == parameter.group and isinstance(group.effect, Effect):
-                names = [group.effect.params[j].name for j in group.params]
-                if parameter.component in names:
-                    return group.columns[[names.index(parameter.component)]]
-        return np.empty(0, dtype=np.intp)
+            for name, column in zip(group.names, group.columns.tolist(), strict=False):
+                out[f"{cause.name}.{name}"] = column
+        return out
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Full names of all parameters, in the order of results."""
-        sensors = [("acc", (0, 1, 2), "cross_coupling"),
-                   ("gyr", (3, 4, 5), "gyro_cross_coupling")]  # fmt: skip
-        out: list[str] = []
-        for sensor, channels, cross in sensors:
-            axes = [CHANNELS[c][-1] for c in channels if c in self.observed]
-            groups = [f"{sensor}_bias", f"{sensor}_scale"]
-            out += [f"{g}.{a}" for g in groups for a in axes]
-            out += self._effect_names(cross)
-            if sensor == "acc":
-                out += self._effect_names(self.options.tilt)
-        return tuple(n for n in out if len(self.columns_for(n)))
-
-    def _effect_names(self, name: str) -> list[str]:
-        return [
-            f"{name}.{group.effect.params[j].name}"
-            for cause, group in self.base_members
-            if cause.name == name and isinstance(group.effect, Effect)
-            for j in group.params
-        ]
+        groups = (
+            *("acc_bias", "acc_scale", "cross_coupling", self.options.tilt),
+            *("gyr_bias", "gyr_scale", "gyro_cross_coupling"),
+        )
+        return tuple(n for g in groups for n in self.column_by_name if group_of(n) == g)
 
 
 def _given_cause(group: Group) -> Cause:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fieldcal.calibration.lot_prior import LotPrior
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.solve import averaging
 from fieldcal.solve.averaging import (
@@ -29,9 +29,6 @@ def made_set(turned: bool = False, prior: float = 10.0) -> Any:
     at_end = np.zeros((2, 6, WIDTH))
     at_end[0, 0, 5], at_end[1, 5, 5], at_end[1, 0, 5] = 7.0, 0.5, 99.0
 
-    def columns_for(name: str) -> Index:
-        return np.array([AT[name]])
-
     def prior_sigma(size: float) -> Array:
         return np.full(WIDTH, size * prior)
 
@@ -39,7 +36,7 @@ def made_set(turned: bool = False, prior: float = 10.0) -> Any:
         columns=np.arange(WIDTH), fixed_size=2.0, prior_sigma=prior_sigma
     )
     return SimpleNamespace(
-        names=NAMES, columns_for=columns_for, width=WIDTH, groups=[group],
+        names=NAMES, column_by_name=AT, width=WIDTH, groups=[group],
         bias_scale_at_end=at_end, options=SimpleNamespace(turned=turned),
     )  # fmt: skip
 

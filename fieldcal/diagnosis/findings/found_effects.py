@@ -174,7 +174,7 @@ def merge_turned_parameters(
     effect, out = group.effect, dict(own)
     if effect is None:
         return out
-    names = [effect.params[j].name for j in group.params]
+    names = group.names
     for gone, kept in effect.turned_into.items():
         if kept not in names and gone in out:
             out[kept] = out.pop(gone)

@@ -65,7 +65,7 @@ def highest_peak(
     Spectra of one phase throughout come first: tremor is louder, but is no line. Peaks
     close to those in `taken` are ignored.
     """
-    shortest = min(PERIODOGRAM_SAMPLES, min(map(len, pieces.samples))) / pieces.rate
+    shortest = pieces.shortest_samples(PERIODOGRAM_SAMPLES) / pieces.rate
     low, reach = max(0.05, MIN_CYCLES / shortest), LINE_DISTANCE_CYCLES / shortest
     one_phase = [s for s in spectra if s.count == 1]
     peak = _significant(one_phase, low, reach, taken)

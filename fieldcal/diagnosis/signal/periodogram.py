@@ -188,7 +188,7 @@ def _neighbour_variance(windows: Spectrum, pieces: WindowSamples) -> Array:
     They lie beyond the reach of a line: that of the taper of the shortest window.
     """
     count, size = windows.count, windows.power.shape[1]
-    cycle = pieces.rate / min(PERIODOGRAM_SAMPLES, min(map(len, pieces.samples)))
+    cycle = pieces.rate / pieces.shortest_samples(PERIODOGRAM_SAMPLES)
     close = max(
         NEAREST_NEIGHBOUR, math.ceil(LINE_DISTANCE_CYCLES * cycle / windows.hz[1])
     )

@@ -51,6 +51,10 @@ class WindowSamples:
     usable: tuple[Mask, ...] = ()
     cuts: Array = field(default_factory=lambda: np.zeros(0))
 
+    def shortest_samples(self, most: int) -> int:
+        """Number of samples of the shortest window, or `most` if that is less."""
+        return min(most, *map(len, self.samples))
+
     def with_whole_line(self, hz: float, amplitude: Complex) -> WindowSamples:
         """Restore the part of a line that means and slopes have removed.
 
@@ -102,15 +106,11 @@ def experience_in_windows(
     rows: Rows, held: Sequence[tuple[int, int, int]]
 ) -> Experience:
     """Orientation and forces in the windows of `long_windows`."""
-    x, row_numbers = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
+    x, at = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
     return Experience.at_rest(
-        x.alpha[row_numbers],
-        x.beta[row_numbers],
-        x.gravity,
-        f=x.f[row_numbers],
-        mounting=x.mounting,
-        gamma=x.gamma[row_numbers],
-    )
+        x.alpha[at], x.beta[at], x.gravity, f=x.f[at], mounting=x.mounting,
+        gamma=x.gamma[at],
+    )  # fmt: skip
 
 
 def _detrended(t: Array, values: Array, usable: Mask, cuts: Array) -> Array:

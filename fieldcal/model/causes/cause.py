@@ -87,6 +87,11 @@ class Group:
     random: bool = False
 
     @property
+    def names(self) -> list[str]:
+        """Names of its parameters, of an effect, (k,)."""
+        return [self.effect.params[j].name for j in self.params] if self.effect else []
+
+    @property
     def leading_columns(self) -> Index:
         """Indices, within the group, of the columns of largest typical size.
 

@@ -173,8 +173,7 @@ def _fit_line(t: Array, y: Array, known: Mask, hz: float) -> Array:
     Each counts by its own noise, which is what the fit leaves of it.
     """
     for _ in range(FREQUENCY_STEPS):
-        design = _waves(t, hz)
-        amplitude = np.linalg.lstsq(design[known], y[known], rcond=None)[0]
+        design, amplitude = _fitted_waves(t, y, known, hz)
         left = (y - design @ amplitude)[known]
         rise = np.column_stack([-design[:, 2], design[:, 1]]) @ amplitude[1:]
         slope = (2 * np.pi * t[:, None] * rise)[known]
@@ -183,12 +182,12 @@ def _fit_line(t: Array, y: Array, known: Mask, hz: float) -> Array:
         slope, left = slope / noise, left / noise
         step = float((slope * left).sum() / max(float((slope**2).sum()), 1e-300))
         hz += float(np.clip(step, -1 / t[-1], 1 / t[-1]))
-    design = _waves(t, hz)
-    amplitude = np.linalg.lstsq(design[known], y[known], rcond=None)[0]
+    design, amplitude = _fitted_waves(t, y, known, hz)
     return design[:, 1:] @ amplitude[1:]
 
 
-def _waves(t: Array, hz: float) -> Array:
-    """A constant, a cosine and a sine, (n, 3)."""
+def _fitted_waves(t: Array, y: Array, known: Mask, hz: float) -> tuple[Array, Array]:
+    """A constant, a cosine and a sine, (n, 3), and their amplitudes, (3, c)."""
     turned = 2 * np.pi * hz * t
-    return np.column_stack([np.ones_like(t), np.cos(turned), np.sin(turned)])
+    waves = np.column_stack([np.ones_like(t), np.cos(turned), np.sin(turned)])
+    return waves, np.linalg.lstsq(waves[known], y[known], rcond=None)[0]

@@ -55,7 +55,7 @@ def case(off: Array, places: tuple[Position, ...] = PLACES) -> Case:
     there = sets.evaluate(())
     found = Mixing(d, gram, there, sets.typical_instability).run()
     names = [f"acc_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
-    assert found.columns.tolist() == [int(d.columns_for(n)[0]) for n in names]
+    assert found.columns.tolist() == [d.column_by_name[n] for n in names]
     design = np.zeros((len(places), 3, 6))
     for c in range(3):
         design[:, c, c], design[:, c, 3 + c] = 1.0, perfect[:, c]

@@ -15,9 +15,8 @@ from operator import itemgetter
 import numpy as np
 
 from fieldcal.core.samples import Array, Mask
+from fieldcal.diagnosis.signal.noise_level import FLOOR_NEIGHBOURS, FURTHEST_NEIGHBOUR
 from fieldcal.diagnosis.signal.periodogram import (
-    FLOOR_NEIGHBOURS,
-    FURTHEST_NEIGHBOUR,
     LINE_DISTANCE_CYCLES,
     PERIODOGRAM_SAMPLES,
     Spectrum,

@@ -17,10 +17,10 @@ from typing import Self
 import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import ACC, Array, Index, Mask
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
-from fieldcal.model.causes.basis import Course, General
+from fieldcal.model.causes.basis import General
 from fieldcal.model.causes.cause import (
     CLOSURE,
     MIN_WINDOWS,
@@ -33,6 +33,12 @@ from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.causes.random_causes import random_causes, series_flicker
+from fieldcal.model.causes.site_groups import (
+    gravity_group,
+    rounding_group,
+    speed_group,
+    unoriented_earth_groups,
+)
 from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.causes.wander import Wander
 from fieldcal.physics.experience import Experience
@@ -83,9 +89,9 @@ class Dictionary(ColumnTable):
         self.window_error, self.turns = common, turns
         self.earth = self.attitude = -1
         self.always: list[Group] = [
-            *self._calibration(), *self._gravity(), *self._unoriented_earth(),
-            *self._attitudes(), *self._speeds(), *self._filters(),
-            *self._shared_rounding(shared_error),
+            *self._calibration(), *gravity_group(self), *self._unoriented_earth(),
+            *self._attitudes(), *speed_group(self), *self._filters(),
+            *rounding_group(self, shared_error),
         ]  # fmt: skip
         self.unoriented = np.array(
             [self._is_unoriented(p) for p in self.window_positions]
@@ -201,12 +207,9 @@ class Dictionary(ColumnTable):
         self.earth = int(at[0])
         return at
 
-    def _gravity(self) -> Iterator[Group]:
-        """Group of the uncertainty of gravity, which all accelerometers share."""
-        if self.x.gravity_sigma and self.used[:, ACC].any():
-            at = self.add(General("gravity", columns.gravity), 1)
-            size = np.array([self.x.gravity_sigma / self.x.gravity])
-            yield Group("gravity", "acc", at, size, fixed_size=1.0)
+    def _unoriented_earth(self) -> Iterator[Group]:
+        """Groups of the Earth's rate in positions of unknown orientation."""
+        yield from unoriented_earth_groups(self)
 
     def _attitudes(self) -> Iterator[Group]:
         """Group of the errors of attitudes that have a stated uncertainty."""
@@ -223,56 +226,10 @@ class Dictionary(ColumnTable):
         wide = np.repeat(sigma[known], 3)
         yield Group("attitude", "", at, wide, fixed_size=1.0, in_state=True)
 
-    def _speeds(self) -> Iterator[Group]:
-        """Group of the errors of a rate table's speeds, if its axis is not known.
-
-        There is one relative error for each speed. It includes the Earth's rate along
-        the axis of the table, which does not depend on the orientation of the device.
-        """
-        known = np.unique(self.x.speed[self.x.speed > 0])
-        if not len(known) or not self.has_gyroscopes:
-            return
-        at = self.add(General("speed", columns.speed(known)), len(known))
-        error = np.array([self.x.speed_sigma[self.x.speed == v].max() for v in known])
-        wide = np.hypot(error, EARTH_RATE / 3**0.5) / known
-        yield Group("speed", "gyr", at, wide, fixed_size=1.0)
-
     def _filters(self) -> Iterator[Group]:
         """Group of the sensors' filters during turns."""
         if self.turns and self.has_gyroscopes:
             yield filtered_turns(self)
-
-    def _unoriented_earth(self) -> Iterator[Group]:
-        """Groups of the Earth's rate in positions of unknown orientation.
-
-        In a session of one position it is part of the bias.
-        """
-        if not self.has_gyroscopes or len(self.window_positions) < 2:
-            return
-        shown = self.x.earth_seen
-        if shown.any():
-            basis = General("earth aside", columns.earth_rate_direction)
-            held = np.unique(self.x.position[shown])
-            own = self.add(basis, 2 * self.position_count).reshape(-1, 2)[held].ravel()
-            wide = np.full(len(own), 1 / priors.FREE_SIZE)
-            yield Group("earth aside", "gyr", own, wide, fixed_size=priors.FREE_SIZE)
-        if self.x.earth_unseen.any():
-            at = self.add(General("earth anyhow", columns.earth_rate_unoriented), 4)
-            size = EARTH_RATE * np.array([3**-0.5, 3**-0.5, 3**-0.5, 1.0])
-            yield Group("earth anyhow", "gyr", at, size, fixed_size=1.0)
-
-    def _shared_rounding(self, sizes: Array | None) -> Iterator[Group]:
-        """Group of the errors of rounding and of dead bands that all windows share.
-
-        They act while an output keeps its value; where outputs change they average out.
-        """
-        if sizes is None or not len(some := np.flatnonzero(sizes)):
-            return
-        even = Course(
-            "rounding", lambda v: np.ones((len(v.x.t), 1)), 1, while_output_stands=True
-        )
-        at = self.add(even, 6)
-        yield Group("rounding", "", at[some], sizes[some], fixed_size=1.0)
 
     def _is_unoriented(self, p: int) -> bool:
         """Whether the direction of a position's force, or of its rate, is not known."""

@@ -151,27 +151,8 @@ def gram(
     if None.
     """
     kept = np.arange(dictionary.width) if columns is None else np.unique(columns)
-    index = np.full(dictionary.width, -1, dtype=np.intp)
-    index[kept] = np.arange(len(kept))
-    held = dictionary.window_positions
-    size = len(held) + len(turns)
-    kind = np.tile(np.arange(6), (size, 1))
-    kind[len(held) :] = CLOSURE
-    shared = np.zeros((size, 6))
-    shared[: len(held)] = dictionary.window_error
-    out = Gram(
-        np.zeros((len(kept), len(kept))),
-        np.zeros(len(kept)),
-        0.0,
-        np.zeros((size, 6, len(kept))),
-        np.zeros((size, 6)),
-        np.zeros((size, 6)),
-        shared,
-        np.zeros((size, 6, 2)),
-        kind,
-        np.zeros((size, 6, 6)),
-        index,
-    )
+    out = _empty_gram(dictionary, kept, len(turns))
+    held, index = dictionary.window_positions, out.index
     free = np.zeros(dictionary.width, dtype=bool)
     for j in np.flatnonzero(dictionary.unoriented):
         free[dictionary.rotations_of(held[j])] = True
@@ -184,6 +165,24 @@ def gram(
         at = index[dictionary.rotations_of(held[j])]
         out.free_rotations[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
     return replace(out, square=sum(squares))
+
+
+def _empty_gram(dictionary: Dictionary, kept: Index, turns: int) -> Gram:
+    """Gram matrix of some columns (k,) without any row."""
+    index = np.full(dictionary.width, -1, dtype=np.intp)
+    index[kept] = np.arange(len(kept))
+    held, k = len(dictionary.window_positions), len(kept)
+    size = held + turns
+    kind = np.tile(np.arange(6), (size, 1))
+    kind[held:] = CLOSURE
+    shared = np.zeros((size, 6))
+    shared[:held] = dictionary.window_error
+    return Gram(
+        within=np.zeros((k, k)), rhs=np.zeros(k), square=0.0,
+        means=np.zeros((size, 6, k)), residual=np.zeros((size, 6)),
+        info=np.zeros((size, 6)), shared=shared, free_rotations=np.zeros((size, 6, 2)),
+        kind=kind, closure_errors=np.zeros((size, 6, 6)), index=index,
+    )  # fmt: skip
 
 
 def _add_windows(out: Gram, part: LinearRows, values: Array, free: Mask) -> float:

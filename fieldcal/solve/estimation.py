@@ -112,6 +112,11 @@ class ParameterEstimate:
     contradicted_turns: tuple[tuple[int, int], ...] = ()
     wrong_angles: tuple[WrongAngles, ...] = ()
 
+    @property
+    def sigma(self) -> Array:
+        """Standard uncertainties, (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
     def with_model_uncertainty(
         self, one: ParameterEstimate, other: ParameterEstimate, weight: float
     ) -> ParameterEstimate:

@@ -144,13 +144,8 @@ def combine_with_lot(
 ) -> tuple[ParameterEstimate, LotContribution | None]:
     """The estimate with the lot, or without it if the unit is an outlier.
 
-    The contribution is None if unit and lot have no parameter in common.
-
-    Parameters
-    ----------
-    own, with_lot : estimates without the lot and with it
-    lot : prior from the lot
-
+    `own` is the estimate without the lot. The contribution is None if unit and lot have
+    no parameter in common.
     """
     lot = lot.subset([n for n in with_lot.names if n in own.parameter_set.names])
     if not lot.names:
@@ -174,10 +169,8 @@ def combine_with_lot(
 
 def _estimates(estimate: ParameterEstimate) -> dict[str, tuple[float, float]]:
     """Value and sigma of each parameter by its full name."""
-    rows = zip(
-        estimate.values.tolist(), np.sqrt(np.diag(estimate.covariance)), strict=True
-    )
-    return {n: (v, float(s)) for n, (v, s) in zip(estimate.names, rows, strict=True)}
+    pairs = zip(estimate.values.tolist(), estimate.sigma.tolist(), strict=True)
+    return dict(zip(estimate.names, pairs, strict=True))
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,12 +36,7 @@ def variants(
 ) -> list[WeightedExplanation]:
     """Variants of an explanation, with their probabilities if it is the right one.
 
-    Parameters
-    ----------
-    sets : over the rows
-    known : the other members of the set
-    explanation : to be varied
-
+    `known` are the other members of the set.
     """
     each = [
         _choices(sets, (*known, *explanation.members), m) for m in explanation.members

@@ -134,19 +134,11 @@ def _values_by_name(
 
 
 def calibration_changes(explanation: Explanation, less: Set) -> dict[str, Quantity]:
-    """Change of the calibration when a cause is taken into account.
+    """Change of the calibration when a cause is taken into account, by full name.
 
-    Parameters
-    ----------
-    explanation : with the cause
-    less : the best set without it
-
-    Returns
-    -------
-    by full name: value with the cause less value without it, with the sigma of the
-    averaged calibration, in the unit of the outputs; parameters that either set does
-    not determine are absent
-
+    That is the value with the cause less that of `less`, the best set without it, with
+    the sigma of the averaged calibration, in the unit of the outputs. Parameters that
+    either set does not determine are absent.
     """
     gauge = explanation.source.about.gauge
     now, before = (

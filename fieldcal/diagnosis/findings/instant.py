@@ -56,12 +56,7 @@ def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, f
 def _squares(z: Array, change: Array, noise: Array) -> Array:
     """S of changes before each instant and after the last, (n + 1,), less a constant.
 
-    Parameters
-    ----------
-    z : (n, 6) samples less the model without the change; nan where missing
-    change : (n, 6)
-    noise : (6,) or (n, 6) standard deviations
-
+    `z` (n, 6) are samples less the model without the change, nan where missing.
     """
     gained = np.nan_to_num(((z - change) ** 2 - z**2) / noise**2).sum(axis=1)
     return np.concatenate([np.cumsum(gained[::-1])[::-1], [0.0]])

@@ -35,13 +35,9 @@ distance from the best, ln."""
 
 
 class HeldOut:
-    """Predicts each part of a session from the others.
+    """Predicts each part of a session from the others, with the columns of `sets`.
 
-    Parameters
-    ----------
-    fitted : the best set
-    sets : sets whose columns are used
-
+    `fitted` is the best set.
     """
 
     def __init__(self, fitted: FittedSet, sets: Sequence[Set]) -> None:

@@ -48,12 +48,8 @@ Estimate = tuple[Array, Array]
 class ModelAverage:
     """Averages over the sets of a posterior.
 
-    Parameters
-    ----------
-    posterior : sets and their probabilities
-    best : sets that replace the best one, with equal weights: its estimate averaged
-        over sizes, and at other time constants
-
+    The sets `best` replace the best one, with equal weights: its estimate averaged over
+    sizes, and at other time constants.
     """
 
     def __init__(self, posterior: Posterior, best: Sequence[Set]) -> None:

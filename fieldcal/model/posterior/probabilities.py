@@ -62,12 +62,7 @@ class ProbableCause:
 class Posterior:
     """Probabilities of causes, from the sets that a search visited.
 
-    Parameters
-    ----------
-    search : with the sets that it visited
-    best : the best of them
-    refined : returns a set with refined time constants
-
+    `best` is the best of them; `refined` returns a set with refined time constants.
     """
 
     def __init__(

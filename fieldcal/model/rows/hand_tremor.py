@@ -94,12 +94,8 @@ def _add_hand_motion(
 ) -> Rows:
     """Add the errors of the means by a hand's motion to rows of whole windows.
 
-    Parameters
-    ----------
-    source, rows : the samples and their rows
-    angle : least rms angle by which the hand turns the force, rad
-    held : (k,) the rows of windows in a hand; all of them if None
-
+    `angle` is the least rms angle by which the hand turns the force, rad; `held` (k,)
+    are the rows of windows in a hand, all of them if None.
     """
     held = np.arange(len(rows.x)) if held is None else held
     turned, pushed, turns = _motion_in_hand(source, rows, held)

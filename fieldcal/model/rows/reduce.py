@@ -130,13 +130,8 @@ def _with_errors_of_site(
 ) -> Array:
     """Add what sway and an unknown direction of the Earth's rate do to whole windows.
 
-    Parameters
-    ----------
-    x : inputs of the device in n rows
-    off : (n, 6) standard deviations of the other errors that all rows of a window
-        share, m/s^2 and rad/s
-    turned : whether there is more than one window
-
+    `off` (n, 6) are the standard deviations of the other errors that all rows of a
+    window share; `turned` states that there is more than one window.
     """
     if source.sway_variance is not None:
         off = np.hypot(off, np.sqrt(source.sway_variance[x.position]))
@@ -153,16 +148,8 @@ def _errors_of_values(
 ) -> tuple[Array, Array]:
     """Errors by rounding and dead bands, which no average makes smaller.
 
-    Parameters
-    ----------
-    windows, rows : (w, 2) samples of each window, and its number of rows
-    y : (n, 6) means of the rows
-
-    Returns
-    -------
     Standard deviations of what all rows of a window share, (n, 6), and of what all
-    windows share, (6,).
-
+    windows share, (6,). `windows` (w, 2) are samples, `rows` their numbers of rows.
     """
     rounded = rounding_sigma(block, windows)
     alike = shared_rounding_sigma(block, windows, rounded)

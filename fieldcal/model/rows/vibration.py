@@ -119,12 +119,7 @@ def _never_changes(levels: Array, grain: Array) -> Mask:
     """Windows in which an output never changes although its noise exceeds a step.
 
     The output is stuck or saturated there, and has no information on the noise.
-
-    Parameters
-    ----------
-    levels : (w, 6) deviation of one sample in each window
-    grain : (6,) deviation within a step of the grid that outputs lie on
-
+    `levels` (w, 6) are deviations of one sample, `grain` (6,) those within a step.
     """
     still: Mask = levels == 0
     usual = [np.median(c[c > 0]) if (c > 0).any() else 0.0 for c in levels.T]

@@ -44,13 +44,7 @@ class WeightedColumns:
 
 
 class GroupGains:
-    """Calculates the gains of all groups, and caches what several sets need.
-
-    Parameters
-    ----------
-    sets : evaluates sets, and has the Gram matrix of the rows
-
-    """
+    """Calculates the gains of all groups, and caches what several sets need."""
 
     def __init__(self, sets: Sets) -> None:
         self._sets = sets

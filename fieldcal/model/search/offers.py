@@ -122,13 +122,7 @@ MAX_LOG_DISTANCE = 12.0
 
 
 class Offers:
-    """Finds the causes that may be added to a set, and predicts the scores with them.
-
-    Parameters
-    ----------
-    sets : evaluates sets, and has the Gram matrix of the rows
-
-    """
+    """Finds the causes that may be added to a set, and predicts scores with them."""
 
     def __init__(self, sets: Sets) -> None:
         self.sets = sets

@@ -33,17 +33,7 @@ PREDICTION_SLACK = 3.0
 
 
 class Search:
-    """The search over one Gram matrix.
-
-    Parameters
-    ----------
-    sets : evaluates sets, and keeps those that were visited
-
-    Attributes
-    ----------
-    offers : to any set
-
-    """
+    """The search over one Gram matrix, with the sets visited, and offers to any set."""
 
     def __init__(self, sets: Sets) -> None:
         self.sets, self.offers = sets, Offers(sets)

@@ -37,13 +37,7 @@ Parts = dict[int, list[tuple[Index, Array]]]
 
 
 class System(ABC):
-    """Rows and a dictionary, linearised about states.
-
-    Parameters
-    ----------
-    dictionary : columns of the rows
-
-    """
+    """Rows, and a dictionary of their columns, linearised about states."""
 
     def __init__(self, dictionary: Dictionary) -> None:
         self.dictionary = dictionary

@@ -83,12 +83,7 @@ class TurnRows:
 class Turns:
     """Makes rows of the turns of a recording.
 
-    Parameters
-    ----------
-    turning : integrates the turns
-    dictionary : columns
-    way : whether the accelerometers during turns are used
-
+    `way` states whether the accelerometers during turns are used.
     """
 
     def __init__(self, turning: TurnTracker, dictionary: Dictionary, way: bool) -> None:
@@ -245,12 +240,8 @@ def _has_unknown_acc_cause(known: Set) -> bool:
 def _known_axes(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:
     """Known axes of a closure: orthonormal rows, (2 or 3, 3), and their information.
 
-    Parameters
-    ----------
-    across : (3, 3) projection on the known part
-    ends : (3, 3) covariance from the forces at both ends, rad^2
-    alike : further variance, the same about all axes, rad^2
-
+    `across` (3, 3) projects on the known part; `ends` (3, 3) is the covariance from the
+    forces at both ends, `alike` further variance about all axes, rad^2.
     """
     values, axes = np.linalg.eigh(across)
     plane: Array = axes[:, values > 0.5].T

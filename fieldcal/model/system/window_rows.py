@@ -23,14 +23,7 @@ m/s^2."""
 
 
 class WindowSystem(System):
-    """Rows of the windows and a dictionary, linearised about states.
-
-    Parameters
-    ----------
-    rows : of the windows
-    dictionary : their columns
-
-    """
+    """Rows of windows, and a dictionary of their columns, linearised about states."""
 
     def __init__(self, rows: Rows, dictionary: Dictionary) -> None:
         super().__init__(dictionary)

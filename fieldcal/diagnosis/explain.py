@@ -183,11 +183,8 @@ class Explanation:
         rows, d = self.rows, self.dictionary
         if not self.shows_earth_rate:
             return False
-        samples = (
-            rows.length.sum()
-            / len(d.window_positions)
-            * sampling_rate(self.source.block)
-        )
+        seconds = rows.length.sum() / len(d.window_positions)
+        samples = seconds * sampling_rate(self.source.block)
         ratio = EARTH_RATE / (np.nanmax(rows.noise[3:]) / np.sqrt(samples))
         return bool(ratio > thresholds.SEES_EARTH)
 
@@ -218,12 +215,9 @@ def explain(
     fit = found.fit
     windows = fit.system.linearised(found.state)
     best = FittedSet(
-        prepared.rows,
-        fit.dictionary,
-        windows,
-        found.values,
+        prepared.rows, fit.dictionary, windows, found.values,
         average_over_sizes(found.search.sets, found.best),
-    )
+    )  # fmt: skip
     enlarge_to_shown_grade(fit.dictionary, best.set, prepared.source.about)
     return Explanation(
         prepared, found, best, fit_calibration_only(fit, prepared.rows), posterior

@@ -58,10 +58,8 @@ def nominal_state(
     return State(
         np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
         np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
-        np.zeros((places, 2)),
-        np.zeros(3),
-        prepared.known,
-    )
+        np.zeros((places, 2)), np.zeros(3), prepared.known,
+    )  # fmt: skip
 
 
 def times_since_turn(source: RowSource, rows: Rows) -> Array:

@@ -69,10 +69,8 @@ def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
     """Make the diagnosis from an explanation of the samples of a block."""
     standing = explanation.probable_causes
     lost = {s.name: found_effects.remove_cause(explanation, s) for s in standing}
-    first, then = (
-        simulation_residuals(block, explanation),
-        explained_residuals(explanation),
-    )
+    first = simulation_residuals(block, explanation)
+    then = explained_residuals(explanation)
     effects = _effects(explanation, lost, then)
     strange = _without_effect(explanation, lost)
     odd = _impossible_facts(explanation)
@@ -96,21 +94,15 @@ def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
         notes(explanation, _undetermined(explanation)), odd,
     )  # fmt: skip
     return Diagnosis(
-        verdict=verdict,
-        probability=_probability(explanation, verdict),
-        mismatch=mismatch,
-        effects=tuple(effects),
-        unit=quality[2],
-        before=quality[0],
-        after=quality[1],
-        calibration=calibration_groups(explanation),
-        warnings=(*odd, *_warnings(explanation)),
-        says=words,
+        verdict=verdict, probability=_probability(explanation, verdict),
+        mismatch=mismatch, effects=tuple(effects), unit=quality[2], before=quality[0],
+        after=quality[1], calibration=calibration_groups(explanation),
+        warnings=(*odd, *_warnings(explanation)), says=words,
         candidates=tried_candidates(explanation, effects),
         curves=tuple(residual_curves(explanation, mismatch, first, then)),
         next=tuple(advice(explanation, by_impact(effects), strange, mismatch, odd)),
         lines=effect_lines(by_impact(effects)),
-    )
+    )  # fmt: skip
 
 
 def _quality(
@@ -149,11 +141,9 @@ def _effects(
         )
     for cause in explanation.probable_causes:
         if cause.name in catalogue():
-            effects.append(
-                found_effects.effect_of_cause(
-                    explanation, cause, lost[cause.name], then
-                )
-            )
+            removal = lost[cause.name]
+            found = found_effects.effect_of_cause(explanation, cause, removal, then)
+            effects.append(found)
     effects += found_filters(explanation)
     if explanation.each_window_shows_earth_rate:
         evidence = {"delta_chi2": 2 * explanation.earth_rate_evidence}

@@ -100,10 +100,8 @@ def _parameters_at_end(
     parameter_set: ParameterSet, mixture: Mixture, nominal: State
 ) -> tuple[Array, Array]:
     """Parameters of an explanation at the end of the recording (`end_values`)."""
-    picked, before = (
-        parameter_matrix(parameter_set, mixture.columns),
-        _nominal_values(parameter_set, nominal),
-    )
+    picked = parameter_matrix(parameter_set, mixture.columns)
+    before = _nominal_values(parameter_set, nominal)
     return before + picked @ mixture.mean, picked @ mixture.covariance @ picked.T
 
 
@@ -149,7 +147,7 @@ def select_determined(
     """Names, values, covariance and shifts of determined parameters; other names."""
     before = np.zeros(parameter_set.width)
     for group in parameter_set.groups:
-        before[group.columns] = group.prior_sigma(group.fixed_size or 1.0)
+        before[group.columns] = group.own_sigma()
     sigma = np.sqrt(np.diag(found.covariance))
     limits = thresholds.USEFUL | (
         {"gyr_scale": thresholds.USEFUL_TURNED} if parameter_set.options.turned else {}

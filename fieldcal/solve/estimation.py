@@ -155,11 +155,7 @@ class ParameterEstimate:
     def coarser_probabilities(self, stated: FactoryErrors) -> dict[str, float]:
         """Probability that each kind of error is as in the set, and not as stated."""
         state = self.sets.evaluate(self.parameter_set.members).state
-        left = [
-            group
-            for _, group in self.parameter_set.base_members
-            if group.cause == "factory"
-        ]
+        left = [g for _, g in self.parameter_set.base_members if g.cause == "factory"]
         return chances_of_coarser(
             state, left, self.parameter_set.options.factory, stated
         )

@@ -89,11 +89,8 @@ def translate_explanations(
         both_tilts = bool(has & unseen) and unseen <= {
             cause.name for cause, _ in explanation.members
         }
-        kept = [
-            m
-            for m in explanation.members
-            if _is_missing(m, has if both_tilts else has | unseen)
-        ]
+        known = has if both_tilts else has | unseen
+        kept = [m for m in explanation.members if _is_missing(m, known)]
         own |= {group: cause for cause, group in kept}
         key = frozenset(group for _, group in kept)
         total[key] = total.get(key, 0.0) + explanation.probability

@@ -97,18 +97,13 @@ class Observations:
         if not averages:
             raise InputError("there is no position with a window: take at least two")
         return cls(
-            tuple(positions),
-            np.array([a.mean for a in averages]),
-            np.array([_regularised(a.covariance) for a in averages]),
-            gravity,
+            tuple(positions), np.array([a.mean for a in averages]),
+            np.array([_regularised(a.covariance) for a in averages]), gravity,
             np.array([a.temperature for a in averages]),
-            np.array([(a.start + a.end) / 2 for a in averages]),
-            latitude,
-            np.eye(3) if mounting is None else mounting,
-            grade,
-            nominal or Nominal(),
+            np.array([(a.start + a.end) / 2 for a in averages]), latitude,
+            np.eye(3) if mounting is None else mounting, grade, nominal or Nominal(),
             base_motion or BaseMotion(),
-        )
+        )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -117,13 +112,10 @@ class Observations:
         """Return the observations of some positions."""
         rows = np.asarray(rows, dtype=int)
         return replace(
-            self,
-            positions=tuple(self.positions[i] for i in rows),
-            mean=self.mean[rows],
-            covariance=self.covariance[rows],
-            temperature=self.temperature[rows],
-            time=self.time[rows],
-        )
+            self, positions=tuple(self.positions[i] for i in rows),
+            mean=self.mean[rows], covariance=self.covariance[rows],
+            temperature=self.temperature[rows], time=self.time[rows],
+        )  # fmt: skip
 
     @property
     def has_acc(self) -> bool:

@@ -66,16 +66,11 @@ def solve(observations: Observations, options: SolveOptions) -> Calibration:
         place = slice(first, first := first + len(part.names))
         covariance[place, place] = part.covariance
     return Calibration(
-        method="least_squares" if method == "auto" else method,
-        names=names,
-        values=np.concatenate([p.values for p in parts]),
-        covariance=covariance,
-        units=tuple(UNITS[group_of(n)] for n in names),
-        chi2=0.0,
-        dof=0,
-        rms=float("nan"),
-        warnings=tuple(sentences),
-    )
+        method="least_squares" if method == "auto" else method, names=names,
+        values=np.concatenate([p.values for p in parts]), covariance=covariance,
+        units=tuple(UNITS[group_of(n)] for n in names), chi2=0.0, dof=0,
+        rms=float("nan"), warnings=tuple(sentences),
+    )  # fmt: skip
 
 
 def _check_supported(observations: Observations, options: SolveOptions) -> None:

@@ -71,18 +71,12 @@ def build_calibration(
     info = _info(method, observations, options, estimate)
     info |= {"borrowed": lot_contribution.to_json()} if lot_contribution else {}
     return Calibration(
-        method=method,
-        names=names,
-        values=estimate.values,
-        covariance=estimate.covariance,
-        units=tuple(UNITS[group_of(n)] for n in names),
-        chi2=fit.chi2,
-        dof=fit.dof,
-        rms=estimate.acc.rms,
-        warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
-        good=not odd,
+        method=method, names=names, values=estimate.values,
+        covariance=estimate.covariance, units=tuple(UNITS[group_of(n)] for n in names),
+        chi2=fit.chi2, dof=fit.dof, rms=estimate.acc.rms,
+        warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)), good=not odd,
         info=info,
-    )
+    )  # fmt: skip
 
 
 def _remarks(
@@ -138,11 +132,8 @@ def _carried_info(
     moved = dict(zip(estimate.names, estimate.shift_sigmas.tolist(), strict=True))
     out: dict[str, Any] = {"causes": estimate.causes, "moved_sigmas": moved}
     if estimate.valid_at_s is not None:
-        last = (
-            float(observations.temperature[-1])
-            if len(observations.temperature)
-            else np.nan
-        )
+        degrees = observations.temperature
+        last = float(degrees[-1]) if len(degrees) else np.nan
         warm = last if np.isfinite(last) else None
         out["as_of"] = {"since_start_s": estimate.valid_at_s, "temperature_degc": warm}
     return out

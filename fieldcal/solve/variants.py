@@ -122,9 +122,7 @@ def _scores(sets: Sets, members: tuple[Member, ...], member: Member) -> Array:
     for k in np.unique(width).tolist():
         alike = np.flatnonzero(width == k)
         at = np.searchsorted(every, [others[j].columns for j in alike])
-        size = np.array(
-            [others[j].prior_sigma(others[j].fixed_size or 1.0) for j in alike]
-        )
+        size = np.array([others[j].own_sigma() for j in alike])
         square = inner[at[:, :, None], at[:, None, :]]
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)

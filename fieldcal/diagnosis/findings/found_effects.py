@@ -97,13 +97,9 @@ def effect_of_cause(
     }
     known = tuple(n for n in standing.aliases if n in catalogue())
     return FoundEffect(
-        standing.name,
-        parameter_estimates(explanation, standing),
-        known,
-        evidence,
-        standing.probability,
-        calibration_changes(explanation, lost.set),
-    )
+        standing.name, parameter_estimates(explanation, standing), known, evidence,
+        standing.probability, calibration_changes(explanation, lost.set),
+    )  # fmt: skip
 
 
 def _score_at_instability(less: Set, best: Set) -> float:

@@ -71,10 +71,8 @@ def _possible_instants(
     instants = np.append(
         np.flatnonzero(squares < squares.min() + thresholds.IN_CHANNEL), near
     )
-    first, last = (
-        max(int(instants.min()) - 1, 0),
-        min(int(instants.max()), len(span) - 1),
-    )
+    first = max(int(instants.min()) - 1, 0)
+    last = min(int(instants.max()), len(span) - 1)
     return float(span[first, 0]), float(span[last, 1])
 
 

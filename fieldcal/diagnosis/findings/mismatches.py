@@ -69,15 +69,10 @@ def _in_windows(
     start, end = time_span(explanation, at)
     inside = np.isin(position, at)
     return Mismatch(
-        channel=CHANNELS[c],
-        kind=kind,
-        positions=at,
-        from_s=start,
-        to_s=end,
-        covariate=covariate,
-        rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
+        channel=CHANNELS[c], kind=kind, positions=at, from_s=start, to_s=end,
+        covariate=covariate, rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
         sigma=float(np.sqrt(max(lost.squares[c], 0.0))),
-    )
+    )  # fmt: skip
 
 
 def outstanding_positions(z: Array, position: Index) -> tuple[int, ...]:

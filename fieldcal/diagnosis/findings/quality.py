@@ -37,13 +37,9 @@ def _model_residuals(
     same = fitted.rows.y.shape == weighed.rows.y.shape
     squares = weighed.squares_of(fitted.residual()) if same else fitted.squares
     return ModelResiduals(
-        fitted.rows,
-        fitted.residual(fitted.deterministic_estimate),
-        ahead,
-        lines,
-        predicted,
-        float(squares.sum()) / max(fitted.dof, 1),
-    )
+        fitted.rows, fitted.residual(fitted.deterministic_estimate), ahead, lines,
+        predicted, float(squares.sum()) / max(fitted.dof, 1),
+    )  # fmt: skip
 
 
 def simulation_residuals(block: Block, explanation: Explanation) -> ModelResiduals:

@@ -183,11 +183,8 @@ def _off_rails(faults: list[Fault], samples: CheckedSamples) -> list[Fault]:
     rails = {f.channel: f.rows for f in _find("saturation", samples)}
     clipped = [bool(np.isin(f.rows, rails.get(f.channel, ())).all()) for f in faults]
     often = Counter(f.channel for f, c in zip(faults, clipped, strict=True) if c)
-    return [
-        f
-        for f, c in zip(faults, clipped, strict=True)
-        if not (c and often[f.channel] > 1)
-    ]
+    pairs = zip(faults, clipped, strict=True)
+    return [f for f, c in pairs if not (c and often[f.channel] > 1)]
 
 
 def _is_stuck(fault: Fault, faults: list[tuple[str, Fault]]) -> bool:
@@ -238,14 +235,9 @@ def samples_to_check(block: Block, usable: Mask, about: Description) -> CheckedS
     )
     limits = [about.limits.get(k, np.nan) for k in ("acceleration", "angular_rate")]
     return CheckedSamples(
-        block=block,
-        windows=windows,
-        x=x,
+        block=block, windows=windows, x=x,
         scale=np.concatenate([about.nominal["acc_scale"], about.nominal["gyr_scale"]]),
         bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
-        noise=noise.white,
-        quick=noise.quick,
-        steps=grids_of(block),
-        limits=np.array(limits),
-        rate_hz=about.rate_hz or np.nan,
-    )
+        noise=noise.white, quick=noise.quick, steps=grids_of(block),
+        limits=np.array(limits), rate_hz=about.rate_hz or np.nan,
+    )  # fmt: skip

@@ -260,16 +260,9 @@ def _line_at(
     spread = float(np.concatenate(pieces.times).std())
     sigmas["hz"] = float(1 / (2 * np.pi * spread * np.sqrt(max(chi2, 1.0))))
     return SpectralLine(
-        effect,
-        float(hz),
-        causes,
-        values,
-        sigmas,
-        tuple(clear),
-        amplitude,
-        chi2,
+        effect, float(hz), causes, values, sigmas, tuple(clear), amplitude, chi2,
         chi2 / 2 - float(np.log1p(strength / 2).sum()),
-    )
+    )  # fmt: skip
 
 
 def _named_amplitudes(

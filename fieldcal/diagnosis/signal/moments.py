@@ -57,13 +57,10 @@ class Moments:
         size = np.diff(self.bound)
         parts = np.repeat(groups, size)
         return Moments(
-            self.near,
-            self.sums[parts],
-            self.middle[parts],
-            np.append(0, np.cumsum(size[groups])),
-            self.window[groups],
+            self.near, self.sums[parts], self.middle[parts],
+            np.append(0, np.cumsum(size[groups])), self.window[groups],
             self.counts[groups],
-        )
+        )  # fmt: skip
 
 
 def moments_of(pieces: WindowSamples, near: float, stretches: int = 1) -> Moments:
@@ -85,13 +82,9 @@ def moments_of(pieces: WindowSamples, near: float, stretches: int = 1) -> Moment
             counts.append(float(last - first))
     window = np.repeat(np.arange(len(pieces.samples)), stretches)
     return Moments(
-        near,
-        np.array(sums),
-        np.array(middle),
-        np.array(bound),
-        window,
+        near, np.array(sums), np.array(middle), np.array(bound), window,
         np.array(counts),
-    )
+    )  # fmt: skip
 
 
 def _part_bounds(first: int, last: int, parts: int) -> list[int]:

@@ -127,11 +127,8 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
         frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
-    triads = [
-        channels
-        for channels in CHANNEL_GROUPS
-        if set(channels) <= set(windows.channels)
-    ]
+    measured = set(windows.channels)
+    triads = [channels for channels in CHANNEL_GROUPS if measured.issuperset(channels)]
     # electronics may disturb one output alone, motion of the base disturbs a triad
     groups = [(*windows.channel_groups, *triads), tuple(triads)]
     variance = _neighbour_variance(windows, pieces)

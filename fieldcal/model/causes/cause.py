@@ -131,6 +131,10 @@ class Group:
         """Prior standard deviation of each column at size v, (k,)."""
         return v * self.typical
 
+    def own_sigma(self, v: float = 1.0) -> Array:
+        """The same at its known size; at size v if that is not known."""
+        return self.prior_sigma(v if self.fixed_size is None else self.fixed_size)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cause:

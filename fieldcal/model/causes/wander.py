@@ -80,10 +80,8 @@ class Wander:
     @classmethod
     def of(cls, rows: Rows, unit: Array) -> Wander:
         """Estimate it from rows; `unit` (6,) are outputs per SI unit."""
-        length, (speed, flicker, share) = (
-            float(np.ptp(rows.x.t)),
-            wander_sizes(rows, unit),
-        )
+        length = float(np.ptp(rows.x.t))
+        speed, flicker, share = wander_sizes(rows, unit)
         information = np.where(rows.used, 1 / rows.sd**2, 0.0).sum(axis=0) / 2
         walks = speed * np.sqrt(2 * length * information) / np.pi  # (5)
         resolved = np.fmax(walks, flicker**2 * information)  # (5)

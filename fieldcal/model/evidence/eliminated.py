@@ -125,10 +125,8 @@ def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
     determined = strength > MIN_EIGENVALUE * np.maximum(
         np.asarray(own)[..., None], 1e-300
     )
-    strength, power = (
-        np.where(determined, strength, 0.0),
-        np.where(determined, power, 0.0),
-    )
+    strength = np.where(determined, strength, 0.0)
+    power = np.where(determined, power, 0.0)
     return gains_from_eigenvalues(strength, power)
 
 

@@ -62,12 +62,9 @@ class Gram:
         index = np.full(len(self.index), -1, dtype=np.intp)
         index[kept] = np.arange(len(kept))
         return replace(
-            self,
-            within=self.within[np.ix_(at, at)],
-            rhs=self.rhs[at],
-            means=self.means[:, :, at],
-            index=index,
-        )
+            self, within=self.within[np.ix_(at, at)], rhs=self.rhs[at],
+            means=self.means[:, :, at], index=index,
+        )  # fmt: skip
 
     def blocks(self, columns: Sequence[Index]) -> list[Array]:
         """Blocks of `within`, which do not depend on the instability."""
@@ -76,14 +73,8 @@ class Gram:
 
     def select_windows(self, windows: Mask, info: Array) -> Gram:
         """Some windows, with other information on their means."""
-        parts = (
-            "means",
-            "residual",
-            "shared",
-            "free_rotations",
-            "kind",
-            "closure_errors",
-        )
+        parts = ("means", "residual", "shared", "free_rotations", "kind",
+                 "closure_errors")  # fmt: skip
         kept = {name: getattr(self, name)[windows] for name in parts}
         return replace(self, info=info[windows], **kept)
 

@@ -61,11 +61,8 @@ class HeldOut:
             chosen = max(
                 (rest.evaluate(s.members, s.sizes) for s in sets), key=lambda s: s.score
             )
-            step = (
-                self.fitted.values
-                - estimates_by_column(chosen.state, d)
-                + _random_estimate(chosen, d)
-            )
+            estimate = estimates_by_column(chosen.state, d)
+            step = self.fitted.values - estimate + _random_estimate(chosen, d)
             places = d.window_positions[np.isin(d.window_positions, d.x.position[left])]
             if len(d.window_positions) >= MIN_WINDOWS:
                 step[d.rotations_of(places)] = 0.0

@@ -126,11 +126,9 @@ class Mixing:
         given: bool = True,
         doubt: bool = True,
     ) -> None:
-        self.dictionary, self.fitted, self.typical_instability = (
-            dictionary,
-            fitted,
-            typical_instability,
-        )
+        self.dictionary = dictionary
+        self.fitted = fitted
+        self.typical_instability = typical_instability
         self.density = GIVEN_SET_LOG_DENSITY if given else INSTABILITY_LOG_DENSITY
         sizing = Sizing(
             dictionary, gram, typical_instability, fitted.members, fitted.sizes
@@ -147,10 +145,8 @@ class Mixing:
         best = sum(max(h.score for h in hypotheses) for hypotheses in lists)
         near = [parts for parts in product(*lists)
                 if sum(h.score for h in parts) > best - MAX_LOG_DISTANCE]  # fmt: skip
-        tau = (
-            priors.SIZES[[self._sizes_of(parts) for parts in near]]
-            * self.typical_instability
-        )
+        sizes = priors.SIZES[[self._sizes_of(parts) for parts in near]]
+        tau = sizes * self.typical_instability
         score, means, covariances = self._combine_exactly(near, tau)
         score += instability_log_prior(
             self.fitted.sizes.instability, self.typical_instability, self.density
@@ -209,14 +205,10 @@ class Mixing:
             by_window = np.logaddexp.reduce(with_bad, axis=(0, 2))
             total = np.logaddexp.reduce([*without_bad, *by_window])
             self.bad = np.exp(by_window - total)
-            hypotheses += [
-                Hypothesis(
-                    sizes[n], i, v, float(log_prior[n, v]), float(with_bad[n, i, v])
-                )
-                for n, i, v in np.argwhere(
-                    with_bad > without_bad.max() - MAX_LOG_DISTANCE
-                ).tolist()
-            ]
+            near = np.argwhere(with_bad > without_bad.max() - MAX_LOG_DISTANCE)
+            for n, i, v in near.tolist():
+                prior, score = float(log_prior[n, v]), float(with_bad[n, i, v])
+                hypotheses.append(Hypothesis(sizes[n], i, v, prior, score))
         best = max(h.score for h in hypotheses)
         return [h for h in hypotheses if h.score > best - MAX_LOG_DISTANCE]
 
@@ -277,10 +269,8 @@ class Mixing:
         window = np.array([acc.window for acc, *_ in near])
         for bad in np.unique(window).tolist():
             rows = np.flatnonzero(window == bad)
-            columns, prior_sigma = (
-                self.columns,
-                np.tile(self.prior_sigma, (len(rows), 1)),
-            )
+            columns = self.columns
+            prior_sigma = np.tile(self.prior_sigma, (len(rows), 1))
             if bad >= 0:
                 off = priors.SIZES[[near[h][0].size for h in rows.tolist()]]
                 columns = np.append(columns, self.doubted[bad])

@@ -235,13 +235,12 @@ class Posterior:
     def probability(self, names: Iterable[str], triads: frozenset[str] = BOTH) -> float:
         """Probability that one of some causes is present on one of some triads."""
         wanted = set(names)
-        return _sum_of_shares(
-            w
-            for s, w in self.weights
-            if any(
-                c.name in wanted and triads_of(c.part) & triads for c, _ in s.members
-            )
-        )
+
+        def has_one(some: Set) -> bool:
+            named = (c for c, _ in some.members if c.name in wanted)
+            return any(triads_of(c.part) & triads for c in named)
+
+        return _sum_of_shares(w for s, w in self.weights if has_one(s))
 
     def probable_causes(self) -> list[ProbableCause]:
         """Causes of the best set that are likelier present than absent."""

@@ -67,10 +67,8 @@ def rows_of_recording(source: RowSource) -> Rows:
     block = masked(source.block, source.usable)
     six = block.six
     pieces = [six[a:b] for a, b in bound]
-    angle, noise = (
-        force_wander_angle(rows),
-        noise_beside_tremor(rows, pieces, rounding_noise(block, bound)),
-    )
+    angle = force_wander_angle(rows)
+    noise = noise_beside_tremor(rows, pieces, rounding_noise(block, bound))
     if angle or noise is not None:
         in_hand = _add_hand_motion(
             source, reduce_to_rows(source, whole=True, level=noise), angle

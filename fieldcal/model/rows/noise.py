@@ -45,12 +45,8 @@ def rounding_sigma(block: Block, windows: Index) -> Array:
         differences = np.nan_to_num(
             [short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces]
         )
-        off.append(
-            np.maximum(
-                variance_of_mean(step, differences),
-                variance_of_few_values(step, differences),
-            )
-        )
+        few = variance_of_few_values(step, differences)
+        off.append(np.maximum(variance_of_mean(step, differences), few))
     deviation: Array = np.sqrt(np.concatenate(off, axis=1))
     return deviation
 

@@ -116,13 +116,10 @@ def _average_windows(source: RowSource, cut: _CutWindows, level: Array | None) -
     if level is not None:
         noise, levels = level, np.where(cut.whole[:, None], level, levels)
     return average_rows(
-        replace(source, block=shaken.block),
-        np.concatenate(cut.bounds),
-        np.repeat(cut.position, rows),
-        np.repeat(levels, rows, axis=0),
-        noise,
+        replace(source, block=shaken.block), np.concatenate(cut.bounds),
+        np.repeat(cut.position, rows), np.repeat(levels, rows, axis=0), noise,
         np.repeat(shaken.variance, rows, axis=0),
-    )
+    )  # fmt: skip
 
 
 def _with_errors_of_site(

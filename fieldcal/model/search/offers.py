@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -72,6 +73,12 @@ class OfferTable:
     state: Eliminated
     score: float
     offers: list[Offer]
+
+    @classmethod
+    def of(cls, current: Set, level: SetAtInstability, best: BestVariants) -> Self:
+        """Offers of the best variants that a set does not contain, the best first."""
+        offers = ranked_offers(current, level.score, level.instability, best)
+        return cls(level.instability, level.state, level.score, offers)
 
 
 def extra_log_odds(
@@ -157,12 +164,7 @@ class Offers:
             levels = list(at_tried_instabilities(self.sets, current, other_sizes))
             best = self._best_variants(levels, *self.cause_log_priors(current))
             self._tables[offer_key] = [
-                OfferTable(
-                    level.instability,
-                    level.state,
-                    level.score,
-                    ranked_offers(current, level.score, level.instability, variants),
-                )
+                OfferTable.of(current, level, variants)
                 for level, variants in zip(levels, best, strict=True)
             ]
         return self._tables[offer_key]

@@ -120,10 +120,8 @@ def _gains_of_equal_widths(
     pairs: Sequence[list[int]],
 ) -> Iterator[PairGain]:
     """Gains of pairs whose first groups, and whose second groups, have equal widths."""
-    first, then = (
-        _GroupsAfterOthers(one, two, shared),
-        _GroupsAfterOthers(two, one, shared.swapaxes(1, 2)),
-    )
+    first = _GroupsAfterOthers(one, two, shared)
+    then = _GroupsAfterOthers(two, one, shared.swapaxes(1, 2))
     n = np.arange(len(pairs))
     maxima = []
     for begin in (start, np.full(len(pairs), UNIT_INDEX)):
@@ -163,10 +161,8 @@ class _SeparateGroups(NamedTuple):
         strength, axes = np.linalg.eigh(own)
         top = np.diagonal(own, 0, 1, 2).max(axis=1, keepdims=True)
         determined = strength > MIN_EIGENVALUE * np.maximum(top, 1e-300)
-        axes, strength = (
-            axes * determined[:, None, :],
-            np.where(determined, strength, 0.0),
-        )
+        axes = axes * determined[:, None, :]
+        strength = np.where(determined, strength, 0.0)
         along = (right[:, None, :] @ axes)[:, 0]
         profile = gains_from_eigenvalues(strength, along**2) + LOG_DENSITY
         return cls(at, own, right, strength, axes, along, profile)

@@ -111,13 +111,11 @@ class EndColumns:
         columns, up, down, step = self._at(np.searchsorted(self.places, turn.positions))
         f, w = ((a - b) / (2 * step[:, None, None])
                 for a, b in ((up.f, down.f), (up.w, down.w)))  # fmt: skip
-        outputs = np.concatenate(
-            [
-                interpolate_vectors(turn.attitude, turn.done, *np.moveaxis(v, 0, 2))
-                for v in (f, w)
-            ],
-            axis=1,
-        )
+        each = [
+            interpolate_vectors(turn.attitude, turn.done, *np.moveaxis(v, 0, 2))
+            for v in (f, w)
+        ]
+        outputs = np.concatenate(each, axis=1)
         end = turn.attitude[-1]
         one, other = (closures(x.f, x.held, end)[0] for x in (up, down))
         moved = ((one - other) / (2 * step[:, None])).T

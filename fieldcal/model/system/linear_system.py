@@ -188,10 +188,8 @@ def _add_windows(out: Gram, part: LinearRows, values: Array, free: Mask) -> floa
     """
     c, all_ = part.channel, out.index[part.columns]
     selected = all_ >= 0
-    at, design = (
-        all_[selected],
-        part.design if selected.all() else part.design[:, selected],
-    )
+    at = all_[selected]
+    design = part.design if selected.all() else part.design[:, selected]
     in_state = np.where(free[part.columns], 0.0, values[part.columns])
     white = part.white + part.design @ in_state
     rotated = part.design @ (values[part.columns] - in_state)

@@ -85,10 +85,8 @@ class TurnTracker:
         rows, x = self.rows, self.rows.x
         if not rows.used.any(axis=0).all():
             return
-        windows, held = (
-            window_bounds(self.source.block, self.source.about),
-            np.unique(x.position),
-        )
+        windows = window_bounds(self.source.block, self.source.about)
+        held = np.unique(x.position)
         for p, q in zip(held[:-1].tolist(), held[1:].tolist(), strict=True):
             if x.rate[np.isin(x.position, (p, q))].any():
                 continue

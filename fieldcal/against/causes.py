@@ -27,7 +27,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.size_average import average_over_sizes
+from fieldcal.model.posterior.model_average import average_over_sizes
 from fieldcal.physics.effect import CHANCE, Motion, Scatter, Sensor
 
 DIRECTION: dict[Relation, Direction] = {

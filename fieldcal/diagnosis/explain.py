@@ -28,9 +28,8 @@ from fieldcal.model.posterior.held_out import (
     candidate_sets,
     held_out_turn_residuals,
 )
-from fieldcal.model.posterior.model_average import ModelAverage
+from fieldcal.model.posterior.model_average import ModelAverage, average_over_sizes
 from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
-from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
 from fieldcal.model.posterior.turn_force_information import turn_force_information
 from fieldcal.model.rows.averages import Rows

@@ -24,7 +24,8 @@ from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import effect_group, factory_groups
+from fieldcal.model.causes.effect_causes import effect_group
+from fieldcal.model.causes.factory_groups import factory_groups
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.averages import Rows

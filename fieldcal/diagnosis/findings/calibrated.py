@@ -11,8 +11,10 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import CalibrationGroup, Quantity
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.model_average import average_of_columns
-from fieldcal.model.posterior.size_average import average_over_sizes
+from fieldcal.model.posterior.model_average import (
+    average_of_columns,
+    average_over_sizes,
+)
 from fieldcal.model.state import State
 
 GYRO_SCALE = "gyro_scale"

@@ -9,7 +9,6 @@ from itertools import combinations
 
 import numpy as np
 
-from fieldcal.core.factory import WARM_UP_TIME_CONSTANT, WARMING_EFFECTS, FactoryErrors
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Index
 from fieldcal.effects import catalogue
@@ -20,7 +19,6 @@ from fieldcal.model.causes.effect_columns import (
     effect_basis,
     separable_basis,
 )
-from fieldcal.model.causes.hysteresis import hysteresis
 from fieldcal.physics.effect import (
     NO_SHAPE,
     BiasChange,
@@ -86,43 +84,6 @@ def effect_group(
     return Group(
         name, "", at, size, effect, *point, params=tuple(params), in_state=True
     )
-
-
-def factory_group(
-    table: ColumnTable, name: str, size: Array, turned: bool, point: Point = NO_POINT
-) -> Group:
-    """Group of a factory error, whose coefficients have the known sigma `size`, SI."""
-    group = effect_group(table, name, turned, point)
-    wide = (size * units_of(table, catalogue()[name]))[list(group.params)]
-    return replace(group, cause="factory", part=name, typical=wide, fixed_size=1.0)
-
-
-def factory_groups(
-    table: ColumnTable, left: FactoryErrors, turned: bool
-) -> list[Group]:
-    """Groups of the factory errors `left`, which are included and not reported.
-
-    Biases follow the temperature if a thermometer shows a change, and the warm-up of
-    the package otherwise.
-    """
-    if not table.x.f.any():
-        return []
-    shapes = {WARMING_EFFECTS[1]: {"tau_s": WARM_UP_TIME_CONSTANT}}
-    return [
-        hysteresis(table, float(size[0]))
-        if name == "hysteresis"
-        else factory_group(table, name, size, turned, (shapes.get(name, {}), 0))
-        for name, size in factory_sizes(table.x, left).items()
-        if size.any()
-    ]
-
-
-def factory_sizes(x: Experience, left: FactoryErrors) -> dict[str, Array]:
-    """Standard deviation, SI, of each factory error by name: (1,), or (6,)."""
-    sizes = {name: np.array([size]) for name, size in left.by_effect.items()}
-    sizes["hysteresis"] = np.array([left.hysteresis])
-    name, per_k = left.warming_effect(x.warms)
-    return sizes | {name: np.array(per_k)}
 
 
 def groups_at_points(

@@ -201,10 +201,8 @@ class ParameterEstimate:
         """Sum of squares of the normalised closures of turns, and their number."""
         full = np.zeros(self.parameter_set.width)
         np.add.at(full, self.mixture.columns, self.mixture.mean)
-        off = [
-            (t.closure - t.design @ full[t.columns]) ** 2 * t.info
-            for t in self.turn_rows
-        ]
+        turns = self.turn_rows
+        off = [(t.closure - t.design @ full[t.columns]) ** 2 * t.info for t in turns]
         white = np.concatenate([np.zeros(0), *off])
         return float(white.sum()), len(white)
 

@@ -48,11 +48,9 @@ def solve(observations: Observations, options: SolveOptions) -> Calibration:
     if len(still) and observations.has_acc:
         two = len(still) == 2 if method == "auto" else method == "two_position"
         method = "two_position" if two else "five_position"
-        formulas, misprints = (
-            (two_position, TWO_POSITION_MISPRINTS)
-            if two
-            else (five_position, FIVE_POSITION_MISPRINTS)
-        )
+        formulas, misprints = five_position, FIVE_POSITION_MISPRINTS
+        if two:
+            formulas, misprints = two_position, TWO_POSITION_MISPRINTS
         parts.append(formulas(observations[still], as_printed=True))
         sentences.append(misprints)
     if observations.has_gyr:

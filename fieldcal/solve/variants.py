@@ -38,22 +38,16 @@ def variants(
 
     `known` are the other members of the set.
     """
-    each = [
-        _choices(sets, (*known, *explanation.members), m) for m in explanation.members
-    ]
-    each += [
-        _with_and_without(sets, (*known, *explanation.members), m)
-        for m in explanation.possible_members
-    ]
+    whole = (*known, *explanation.members)
+    each = [_choices(sets, whole, m) for m in explanation.members]
+    each += [_with_and_without(sets, whole, m) for m in explanation.possible_members]
     share: dict[tuple[Member, ...], float] = {}
     points = spread_points(
         len(each), max(1, round(REPRESENTATIVE_POINTS * explanation.probability))
     )
     for at in points:
-        picked = [
-            choices[choice_at(weight, u)]
-            for u, (choices, weight) in zip(at, each, strict=True)
-        ]
+        pairs = zip(at, each, strict=True)
+        picked = [choices[choice_at(weight, u)] for u, (choices, weight) in pairs]
         members = tuple(m for chosen in picked for m in chosen)
         share[members] = share.get(members, 0.0) + 1 / len(points)
     return [WeightedExplanation(members, p) for members, p in share.items()]

@@ -41,13 +41,11 @@ def undetermined_warnings(
     if acc and estimate.parameter_set.options.level_deg is not None:
         acc = [n for n in acc if group_of(n) != "base_tilt"]
     if acc:
-        sentences.append(
-            _norm_warning(acc, estimate, len(observations))
-            if method == "scalar"
-            else words.not_determined(
-                acc, _remedy(observations, estimate), "these positions"
-            )
-        )
+        if method == "scalar":
+            sentences.append(_norm_warning(acc, estimate, len(observations)))
+        else:
+            cure = _remedy(observations, estimate)
+            sentences.append(words.not_determined(acc, cure, "these positions"))
         if not any(group_of(n) in OF_ACC for n in estimate.names):
             sentences.append(_force_length_warning(observations))
     gyr = [n for n in estimate.undetermined if group_of(n) == "gyr_scale"]

@@ -123,11 +123,9 @@ def _values_by_name(
     d, nominal = explanation.dictionary, explanation.inferred.fit.nominal
     sigma, out = np.sqrt(np.diag(covariance)), {}
     for column, change, error in zip(at, mean, sigma, strict=True):
-        first, base, kind = (
-            (d.bias, nominal.bias, "bias")
-            if column < d.bias + 6
-            else (d.scale, nominal.scale, "scale")
-        )
+        first, base, kind = d.bias, nominal.bias, "bias"
+        if column >= d.bias + 6:
+            first, base, kind = d.scale, nominal.scale, "scale"
         c = int(column - first)
         name = f"{'acc' if c < 3 else 'gyr'}_{kind}.{'xyz'[c % 3]}"
         size = float(abs(explanation.state.scale[c])) or 1.0

@@ -88,10 +88,8 @@ def subtract_lines(
     x = experience_in_windows(rows, held)
     for tone in found:
         response = tone.amplitudes(x)
-        where = [
-            (slice(a, b), in_window)
-            for (_, a, b), in_window in zip(held, response, strict=True)
-        ]
+        pairs = zip(held, response, strict=True)
+        where = [(slice(a, b), in_window) for (_, a, b), in_window in pairs]
         if tone.effect.kind == "sensor":
             where = [(slice(0, len(block)), response[0])]
         for i, own in enumerate((slice(0, 3), slice(3, 6))):

@@ -71,10 +71,7 @@ def _motion_basis(effect: Motion) -> General:
     def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
         turned = state.turned(plain)
         for step in steps():
-            up, down = (
-                _with_changed_parameters(turned, state, effect, s)
-                for s in (step, -step)
-            )
+            up, down = (_changed(turned, state, effect, s) for s in (step, -step))
             yield up, down, float(step.max())
 
     def on_the_way(view: RowView) -> Array:
@@ -123,7 +120,7 @@ def separable_basis(
     return General(effect.id, of)
 
 
-def _with_changed_parameters(
+def _changed(
     turned: Experience, state: State, effect: Effect, more: Array
 ) -> Experience:
     """Inputs with the parameters of a motion effect changed by `more`.

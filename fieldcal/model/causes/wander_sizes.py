@@ -106,10 +106,8 @@ def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
     few = len(np.unique(rows.x.position)) < MIN_WINDOWS
     for _, triad in TRIADS:
         at = list(triad)
-        differences = [
-            [d for lag in DIFFERENCE_LAGS for d in _differences(rows, c, lag)]
-            for c in at
-        ]
+        lags = DIFFERENCE_LAGS
+        differences = [[d for k in lags for d in _differences(rows, c, k)] for c in at]
         walks = WanderHypotheses(
             walk[at] * unit[at], walk_chance, priors.SINGLE_AXIS_SHARE
         )

@@ -37,12 +37,13 @@ def proportional_causes(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator
     for part, observed in dictionary.triads:
         if len(observed) < 2 or len(dictionary.window_positions) <= MIN_WINDOWS:
             continue
-        about = [_window_offsets(dictionary, fitted, observed) for fitted in sets]
-        groups = tuple(
-            _proportional_group(dictionary, part, observed, offsets)
-            for offsets in about
+        groups = []
+        for fitted in sets:
+            offsets = _window_offsets(dictionary, fitted, observed)
+            groups.append(_proportional_group(dictionary, part, observed, offsets))
+        yield Cause(
+            "position", part, priors.UNKNOWN_FUNCTION_CHANCE, tuple(groups), "unknown"
         )
-        yield Cause("position", part, priors.UNKNOWN_FUNCTION_CHANCE, groups, "unknown")
 
 
 def _window_offsets(d: Dictionary, fitted: Set, channels: Index) -> Array:

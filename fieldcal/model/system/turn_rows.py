@@ -264,7 +264,5 @@ def _drop_shaken_way(rows: list[TurnRows]) -> list[TurnRows]:
     rest = white - used @ np.linalg.lstsq(used, white, rcond=1e-9)[0]
     if float(rest @ rest) <= MAX_WAY_CHI2 * max(size - used.shape[1], 1):
         return rows
-    return [
-        replace(r, way=np.zeros(0), way_design=np.zeros((0, len(r.columns))))
-        for r in rows
-    ]
+    none = np.zeros(0)
+    return [replace(r, way=none, way_design=r.way_design[:0]) for r in rows]

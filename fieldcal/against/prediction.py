@@ -24,7 +24,7 @@ from fieldcal.against.result import SimulatorPrediction
 from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet
 from fieldcal.core.samples import Array, Index
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
+from fieldcal.diagnosis.findings.agreement import rms_over_parts, root_mean_square
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows

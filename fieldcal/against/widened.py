@@ -19,7 +19,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
-from fieldcal.model.posterior.size_average import average_over_sizes
+from fieldcal.model.posterior.model_average import average_over_sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.system.linear_rows import LinearRows
 

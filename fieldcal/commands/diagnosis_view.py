@@ -142,7 +142,7 @@ def _residual_bars(diagnosis: Diagnosis) -> list[RenderableType]:
     from rich.table import Table
     from rich.text import Text
 
-    before, after = diagnosis.before.by_channel, diagnosis.after.by_channel
+    before, after = (q.held_out_by_channel for q in (diagnosis.before, diagnosis.after))
     names = [n for n in before if before[n] > 0 and after.get(n, 0.0) > 0]
     if not names:
         return []

@@ -14,6 +14,8 @@ Array = NDArray[np.floating[Any]]
 
 Index = NDArray[np.intp]
 
+Mask = NDArray[np.bool_]
+
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 UNITS = ("m/s^2",) * 3 + ("rad/s",) * 3
 ACC, GYR = slice(0, 3), slice(3, 6)

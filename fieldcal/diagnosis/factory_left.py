@@ -18,10 +18,13 @@ from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import factory_groups, factory_sizes
+from fieldcal.model.causes.factory_groups import factory_groups, factory_sizes
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.two_grades import chances_of_coarser
-from fieldcal.model.evidence.unfitted_groups import eliminate_with, groups_not_in
+from fieldcal.model.evidence.unfitted_groups import (
+    chances_of_coarser,
+    eliminate_with,
+    groups_not_in,
+)
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 

@@ -23,7 +23,7 @@ from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.base_sway import BaseSway, find_base_sway
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.hand_tremor import rows_of_recording
-from fieldcal.model.rows.means import rows_of_means
+from fieldcal.model.rows.reduce import rows_of_means
 from fieldcal.model.rows.rest_onset import rest_instants
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
@@ -81,35 +81,44 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     known = known_terms(about.model)
     checked = check_chain(block, about)
     about = about.with_scaled_angles(checked.angle_factor)
-    sways = find_base_sway(masked(checked.block, checked.usable), about)
-    if sways is not None:
-        checked = _without_sway(checked, sways, about)
-    rest = rest_instants(checked.block, about, checked.noise)
-    warmth = Thermometer.of(checked.block)
-    source = RowSource(
-        checked.block, about, checked.usable, rest, warmth, checked.clock_pace,
-        *(() if sways is None else
-          (sways.excess_variance, sways.white, sways.gravity_sigma)),
-    )  # fmt: skip
+    checked, source = _checked_source(checked, about)
     rows = rows_of_recording(source)
     _refuse_turning(rows, about)
     lines = find_lines(source, rows)
     tones = tuple(tone for tone, _ in lines)
     left = tuple(remains for _, remains in lines)
     if tones:
-        source = replace(
-            source, block=subtract_lines(source.block, source, rows, tones)
-        )
+        calm = subtract_lines(source.block, source, rows, tones)
+        source = replace(source, block=calm)
         rows = _with_vibration(rows_of_recording(source), rows)
-        checked = recheck_without_lines(checked, source.block, about)
+        checked = recheck_without_lines(checked, calm, about)
     if not rows.used.any():
         raise InputError(
             "nothing in the windows can be used: every output is missing, stuck or"
             " clipped there; record them again"
         )
-    return PreparedRecording(
-        checked, source, _without_constant_temperature(rows, warmth), known, tones, left
+    rows = _without_constant_temperature(rows, source.thermometer)
+    return PreparedRecording(checked, source, rows, known, tones, left)
+
+
+def _checked_source(
+    checked: CheckedRecording, about: Description
+) -> tuple[CheckedRecording, RowSource]:
+    """The samples without a base's swaying, and what is needed to make rows of them."""
+    sways = find_base_sway(masked(checked.block, checked.usable), about)
+    if sways is not None:
+        checked = _without_sway(checked, sways, about)
+    rest = rest_instants(checked.block, about, checked.noise)
+    warmth = Thermometer.of(checked.block)
+    source = RowSource(
+        checked.block, about, checked.usable, rest, warmth, checked.clock_pace
     )
+    if sways is not None:
+        source = replace(
+            source, sway_variance=sways.excess_variance, sway_noise=sways.white,
+            sway_gravity_sigma=sways.gravity_sigma,
+        )  # fmt: skip
+    return checked, source
 
 
 def _without_sway(
@@ -157,14 +166,8 @@ def _prepared_means(block: Block, about: Description) -> PreparedRecording:
             "session.toml says of no position how well its means are known: write"
             " sigma = [ax, ay, az, gx, gy, gz] below each [[position]], m/s^2 and rad/s"
         )
-    return PreparedRecording(
-        checked,
-        source,
-        _without_constant_temperature(rows, warmth),
-        known_terms(about.model),
-        (),
-        (),
-    )
+    rows, known = _without_constant_temperature(rows, warmth), known_terms(about.model)
+    return PreparedRecording(checked, source, rows, known, (), ())
 
 
 def _with_vibration(calm: Rows, shaken: Rows) -> Rows:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 
 Verdict = Literal["consistent", "left_out", "ambiguous", "unexplained"]
 
@@ -19,7 +18,16 @@ Kind = Literal[
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class Part:
+    """A part of diagnosis.json, or all of it."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json: every field by its name."""
+        return {f.name: _as_json(getattr(self, f.name)) for f in fields(self)}
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity(Part):
     """A value with its standard uncertainty and unit; or a text."""
 
     value: float | str
@@ -30,15 +38,11 @@ class Quantity:
         """Return the object of diagnosis.json."""
         if isinstance(self.value, str):
             return {"value": self.value}
-        return {
-            "value": json_number(self.value),
-            "sigma": json_number(self.sigma),
-            "unit": self.unit,
-        }
+        return Part.to_json(self)
 
 
 @dataclass(frozen=True, slots=True)
-class Mismatch:
+class Mismatch(Part):
     """Where simulation and recording differ.
 
     Attributes
@@ -68,24 +72,14 @@ class Mismatch:
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
-        out: dict[str, Any] = {
-            "channel": self.channel,
-            "kind": self.kind,
-            "positions": list(self.positions),
-            "from_s": json_number(self.from_s),
-            "to_s": json_number(self.to_s),
-            "covariate": self.covariate,
-            "rms": json_number(self.rms),
-            "sigma": json_number(self.sigma),
-        }
-        if np.isfinite(self.share):
-            out["correlation"] = json_number(self.correlation)
-            out["share"] = json_number(self.share)
+        out = Part.to_json(self)
+        if not np.isfinite(self.share):
+            del out["correlation"], out["share"]
         return out
 
 
 @dataclass(frozen=True, slots=True)
-class FoundEffect:
+class FoundEffect(Part):
     """An effect of the catalogue that the recording shows.
 
     Attributes
@@ -107,20 +101,9 @@ class FoundEffect:
     probability: float = 1.0
     moves: Mapping[str, Quantity] = field(default_factory=dict)
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the object of diagnosis.json."""
-        return {
-            "id": self.id,
-            "probability": json_number(self.probability),
-            "parameters": {n: q.to_json() for n, q in self.parameters.items()},
-            "aliases": list(self.aliases),
-            "evidence": {n: json_number(v) for n, v in self.evidence.items()},
-            "moves": {n: q.to_json() for n, q in self.moves.items()},
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class EffectLine:
+class EffectLine(Part):
     """An effect in one line, in the words of screen and report.
 
     Attributes
@@ -137,13 +120,9 @@ class EffectLine:
     sure: str
     does: str
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the object of diagnosis.json."""
-        return asdict(self)
-
 
 @dataclass(frozen=True, slots=True)
-class Quality:
+class Quality(Part):
     """How well a model agrees with the recording.
 
     Attributes
@@ -151,29 +130,18 @@ class Quality:
     rms : of the residual, in `Diagnosis.unit`
     chi2_per_dof : of the whitened residual
     held_out_rms : residual of rows predicted by a fit that did not include them
-    by_channel : held-out rms of each channel, m/s^2 and rad/s
+    held_out_by_channel : held-out rms of each channel, m/s^2 and rad/s
 
     """
 
     rms: float
     chi2_per_dof: float
     held_out_rms: float
-    by_channel: Mapping[str, float] = field(default_factory=dict)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the object of diagnosis.json."""
-        return {
-            "rms": json_number(self.rms),
-            "chi2_per_dof": json_number(self.chi2_per_dof),
-            "held_out_rms": json_number(self.held_out_rms),
-            "held_out_by_channel": {
-                n: json_number(v) for n, v in self.by_channel.items()
-            },
-        }
+    held_out_by_channel: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationGroup:
+class CalibrationGroup(Part):
     """A group of the calibration in device axes, with its change from nominal.
 
     `value`, `sigma` and `change` are (3,), nan where not determined.
@@ -186,19 +154,17 @@ class CalibrationGroup:
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
-        return {
-            "value": [json_number(v) for v in self.value],
-            "sigma": [json_number(s) for s in self.sigma],
-            "change_sigmas": [
-                json_number(c / s) if s > 0 else None
-                for c, s in zip(self.change, self.sigma, strict=True)
-            ],
-            "unit": self.unit,
-        }
+        out = Part.to_json(self)
+        del out["change"]
+        out["change_sigmas"] = [
+            json_number(c / s) if s > 0 else None
+            for c, s in zip(self.change, self.sigma, strict=True)
+        ]
+        return out
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class Candidate(Part):
     """One explanation that was tried.
 
     Attributes
@@ -221,21 +187,9 @@ class Candidate:
     chosen: bool
     why: str
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the object of diagnosis.json."""
-        return {
-            "id": self.id,
-            "delta_chi2": json_number(self.delta_chi2),
-            "delta_bic": json_number(self.delta_bic),
-            "held_out_gain": json_number(self.held_out_gain),
-            "probability": json_number(self.probability),
-            "chosen": self.chosen,
-            "why": self.why,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class Curve(Part):
     """A channel's residual over a covariate.
 
     Attributes
@@ -253,25 +207,14 @@ class Curve:
     covariate: str
     unit: str
     x: Array
-    position: NDArray[np.intp]
+    position: Index
     before: Array
     after: Array
     sigma: Array
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the object of diagnosis.json."""
-        columns = ("x", "before", "after", "sigma")
-        return {
-            "channel": self.channel,
-            "covariate": self.covariate,
-            "unit": self.unit,
-            "position": [int(p) for p in self.position],
-            **{n: [json_number(v) for v in getattr(self, n)] for n in columns},
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class Diagnosis:
+class Diagnosis(Part):
     """What the simulation leaves out of a recording, and how well that explains it.
 
     Attributes
@@ -309,24 +252,9 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of diagnosis.json."""
-        return {
-            "verdict": self.verdict,
-            "probability": json_number(self.probability),
-            "mismatch": [m.to_json() for m in self.mismatch],
-            "effects": [e.to_json() for e in self.effects],
-            "fit": {
-                "before": self.before.to_json(),
-                "after": self.after.to_json(),
-                "unit": self.unit,
-            },
-            "calibration": {n: g.to_json() for n, g in self.calibration.items()},
-            "warnings": list(self.warnings),
-            "says": self.says,
-            "candidates": [c.to_json() for c in self.candidates],
-            "curves": [c.to_json() for c in self.curves],
-            "next": list(self.next),
-            "lines": [line.to_json() for line in self.lines],
-        }
+        out = Part.to_json(self)
+        out["fit"] = {name: out.pop(name) for name in ("before", "after", "unit")}
+        return out
 
 
 def json_number(value: float | None) -> float | None:
@@ -334,3 +262,18 @@ def json_number(value: float | None) -> float | None:
     if value is None or not np.isfinite(value):
         return None
     return float(value)
+
+
+def _as_json(value: Any) -> Any:
+    """JSON of a field: of what it holds, with null for numbers that are none."""
+    if isinstance(value, Part):
+        return value.to_json()
+    if isinstance(value, Mapping):
+        return {name: _as_json(each) for name, each in value.items()}
+    if isinstance(value, str | int):
+        return value
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, Sequence):
+        return [_as_json(each) for each in value]
+    return json_number(value)

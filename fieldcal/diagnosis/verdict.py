@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.calibration.names import group_of
 from fieldcal.calibration.parameters import Nominal
 from fieldcal.calibration.plausible import implausible_values, misdirected_turns
 from fieldcal.core.samples import CHANNELS, GYR, Block
@@ -23,6 +22,7 @@ from fieldcal.diagnosis.findings.candidates import tried_candidates
 from fieldcal.diagnosis.findings.curves import residual_curves
 from fieldcal.diagnosis.findings.filters import found_filters
 from fieldcal.diagnosis.findings.found_effects import CauseRemoval
+from fieldcal.diagnosis.findings.limitations import limitations, undetermined_parameters
 from fieldcal.diagnosis.findings.quality import (
     TURN_UNIT,
     explained_residuals,
@@ -36,13 +36,7 @@ from fieldcal.diagnosis.findings.unknown_mismatch import (
     unknown_mismatches,
 )
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.diagnosis.result import (
-    Diagnosis,
-    FoundEffect,
-    Mismatch,
-    Quality,
-    Verdict,
-)
+from fieldcal.diagnosis.result import Diagnosis, FoundEffect, Mismatch, Quality, Verdict
 from fieldcal.diagnosis.wording.advice import advice
 from fieldcal.diagnosis.wording.lines import by_impact, effect_lines
 from fieldcal.diagnosis.wording.paragraph import notes, paragraph
@@ -51,7 +45,6 @@ from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
-from fieldcal.windows.dead_band import dead_band_messages
 
 
 def diagnose(block: Block, about: Description) -> Diagnosis:
@@ -75,16 +68,14 @@ def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
     """Make the diagnosis from an explanation of the samples of a block."""
     standing = explanation.probable_causes
     lost = {s.name: found_effects.remove_cause(explanation, s) for s in standing}
-    first, then = (
-        simulation_residuals(block, explanation),
-        explained_residuals(explanation),
-    )
+    first = simulation_residuals(block, explanation)
+    then = explained_residuals(explanation)
     effects = _effects(explanation, lost, then)
     strange = _without_effect(explanation, lost)
     odd = _impossible_facts(explanation)
     verdict = _verdict(explanation, effects, strange, odd)
     # positions are counted as held up to here, and as listed in session.toml from here
-    indices_in_file = explanation.prepared.source.about.indices_in_file
+    indices_in_file = explanation.source.about.indices_in_file
 
     def counted(one: Mismatch) -> Mismatch:
         return replace(one, positions=tuple(sorted(indices_in_file(one.positions))))
@@ -99,24 +90,18 @@ def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
     quality = _quality(explanation, lost, first, then)
     words = paragraph(
         verdict, effects, mismatch, strange, quality, explanation,
-        notes(explanation, _undetermined(explanation)), odd,
+        notes(explanation, undetermined_parameters(explanation)), odd,
     )  # fmt: skip
     return Diagnosis(
-        verdict=verdict,
-        probability=_probability(explanation, verdict),
-        mismatch=mismatch,
-        effects=tuple(effects),
-        unit=quality[2],
-        before=quality[0],
-        after=quality[1],
-        calibration=calibration_groups(explanation),
-        warnings=(*odd, *_warnings(explanation)),
-        says=words,
+        verdict=verdict, probability=_probability(explanation, verdict),
+        mismatch=mismatch, effects=tuple(effects), unit=quality[2], before=quality[0],
+        after=quality[1], calibration=calibration_groups(explanation),
+        warnings=(*odd, *limitations(explanation)), says=words,
         candidates=tried_candidates(explanation, effects),
         curves=tuple(residual_curves(explanation, mismatch, first, then)),
         next=tuple(advice(explanation, by_impact(effects), strange, mismatch, odd)),
         lines=effect_lines(by_impact(effects)),
-    )
+    )  # fmt: skip
 
 
 def _quality(
@@ -155,11 +140,9 @@ def _effects(
         )
     for cause in explanation.probable_causes:
         if cause.name in catalogue():
-            effects.append(
-                found_effects.effect_of_cause(
-                    explanation, cause, lost[cause.name], then
-                )
-            )
+            removal = lost[cause.name]
+            found = found_effects.effect_of_cause(explanation, cause, removal, then)
+            effects.append(found)
     effects += found_filters(explanation)
     if explanation.each_window_shows_earth_rate:
         evidence = {"delta_chi2": 2 * explanation.earth_rate_evidence}
@@ -200,7 +183,7 @@ def _impossible_facts(explanation: Explanation) -> list[str]:
     Either means that the description of the recording is wrong.
     """
     calibration = calibration_of_set(explanation, explanation.best.set)
-    nominal = explanation.prepared.source.about.nominal
+    nominal = explanation.source.about.nominal
     values = implausible_values(
         tuple(calibration),
         np.array([value for value, _, _ in calibration.values()]),
@@ -216,7 +199,7 @@ def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
 
     Turns during which faults of samples were found are left out.
     """
-    source, faults = explanation.prepared.source, explanation.prepared.checked.faults
+    source, faults = explanation.source, explanation.prepared.checked.faults
     t, windows = source.block.t, window_bounds(source.block, source.about)
     wrong = [f for _, f in faults if {f.channel, *f.channels} & {"t", *CHANNELS[GYR]}]
     out = []
@@ -272,64 +255,3 @@ def _all_mismatches(
             out += mismatches.of_cause(explanation, cause, lost[cause.name])
     out += [u.mismatch for u in strange]
     return sorted(out, key=lambda m: -m.sigma)
-
-
-def _undetermined(explanation: Explanation) -> list[str]:
-    """Full names of parameters of the causes found that the rows do not determine."""
-    out = []
-    for cause in explanation.probable_causes:
-        effect = catalogue().get(cause.name)
-        if effect is None:
-            continue
-        estimates = found_effects.parameter_estimates(explanation, cause)
-        for _, group in cause.members:
-            names = [effect.params[j].name for j in group.params]
-            out += [f"{cause.name}.{n}" for n in names if n not in estimates]
-    return out
-
-
-def _warnings(explanation: Explanation) -> tuple[str, ...]:
-    out = list(explanation.prepared.checked.unused)
-    block = explanation.prepared.source.block
-    out += dead_band_messages(block, explanation.rows.y)
-    numbers = calibration_of_set(explanation, explanation.best.set)
-    for name, first in (("accelerometers", 0), ("gyroscopes", 3)):
-        if explanation.rows.used[:, first : first + 3].any():
-            spare = _degrees_of_freedom(explanation, first)
-            if spare <= 1:
-                spares = "1 degree" if spare == 1 else "0 degrees"
-                out.append(
-                    f"{spares} of freedom in the means of the {name}:"
-                    " their residual says nothing about the fit; take more positions"
-                )
-    loose = [
-        name
-        for name, (_, sigma, size) in numbers.items()
-        if not sigma < thresholds.USEFUL[group_of(name)] * size
-    ]
-    if loose:
-        out.append(f"not determined by these positions: {', '.join(loose)}")
-    return tuple(out)
-
-
-def _degrees_of_freedom(explanation: Explanation, first: int) -> int:
-    """Number of window means less number of parameters, for one triad."""
-    rows, posterior = explanation.rows, explanation.best.set.state
-    part = slice(first, first + 3)
-    held = [
-        rows.used[rows.x.position == p][:, part].any(axis=0).sum()
-        for p in explanation.dictionary.window_positions
-    ]
-    free = explanation.dictionary.unoriented
-    turns = 2 * int(free.sum()) if first == 0 else 0
-    reach = np.zeros(explanation.dictionary.width, dtype=bool)
-    for one in explanation.best.linear:
-        if first <= one.channel < first + 3:
-            reach[one.columns] |= np.abs(one.design).max(axis=0) > 0
-    for cause, group in explanation.best.set.members:
-        if not cause.reportable:  # noise is no parameter
-            reach[group.columns] = False
-    narrowed = (
-        np.diag(posterior.inverse) < thresholds.DETERMINED * posterior.prior_sigma**2
-    )
-    return int(sum(held) - turns - (reach[posterior.columns] & narrowed).sum())

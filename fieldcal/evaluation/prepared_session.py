@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.diagnosis.explain import Explanation, explain, times_since_turn
+from fieldcal.diagnosis.explain import Explanation, explain
+from fieldcal.diagnosis.fit import times_since_turn
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
 from fieldcal.evaluation.observations import build_observations
 from fieldcal.evaluation.rounding_mode import (

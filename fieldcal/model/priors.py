@@ -20,8 +20,10 @@ data sheets do."""
 INSTABILITY_TAIL = 8.0
 """The same for instability: a scatter ten times that of devices has another cause."""
 
-BIAS_ACC, BIAS_GYR, SCALE = 0.3, 2e-2, 1e-2
-"""Typical change from nominal: 30 mg, 1 deg/s, 1 %; what consumer grade reaches."""
+BIAS: Array = np.repeat([0.3, 2e-2], 3)
+SCALE = 1e-2
+"""Typical change from nominal: 30 mg, 1 deg/s, 1 %; what consumer grade reaches. Here
+and below, sizes of the six outputs are (6,), m/s^2 and rad/s."""
 
 FREE_SIZE = 30.0
 """Prior standard deviation of the parameters that a calibration estimates, in typical
@@ -31,8 +33,8 @@ GYRO_COUPLING_SIZE = 2.5
 """The same for the cross-coupling of gyroscopes: 0.05, which no gyroscope exceeds. Two
 turns do not determine all of it; the rest widens the scale factors' intervals."""
 
-INSTABILITY_ACC, INSTABILITY_GYR = 1e-3, 3e-5
-"""Typical scatter of a bias from window to window, m/s^2 and rad/s: 0.1 mg, 6 deg/h."""
+INSTABILITY: Array = np.repeat([1e-3, 3e-5], 3)
+"""Typical scatter of a bias from window to window: 0.1 mg, 6 deg/h."""
 
 CLOSURE_RAD = 5e-4
 """Typical scatter of the closure of a turn beyond the noise, rad: bandwidth, timing and
@@ -42,9 +44,9 @@ FILTERED_S = 0.1
 """Standard deviation of the time constant of a filter of the sensors, s: 1.6 Hz. Data
 sheets have 5 to 260 Hz; where turns do not show it, scale factors are less certain."""
 
-FLICKER_ACC, FLICKER_GYR = 2e-3, 1e-4
-"""Typical flicker noise, m/s^2 and rad/s: where Allan deviations of consumer grade stay
-level, 0.2 mg and 20 deg/h."""
+FLICKER: Array = np.repeat([2e-3, 1e-4], 3)
+"""Typical flicker noise: where Allan deviations of consumer grade stay level, 0.2 mg
+and 20 deg/h."""
 
 FLICKER_CHANCE = 0.1
 """Probability that the larger part of a bias's wander is flicker, which neighbouring
@@ -53,8 +55,8 @@ windows share, and not an offset that is new in each window."""
 AXES_LOG_SPREAD = 0.3
 """Spread of the instabilities of a triad's axes, ln: they are of the same make."""
 
-UNKNOWN_ACC, UNKNOWN_GYR = 2e-2, 1e-3
-"""Typical size of a function that no effect makes, m/s^2 and rad/s: as of effects."""
+UNKNOWN: Array = np.repeat([2e-2, 1e-3], 3)
+"""Typical size of a function that no effect makes: as of effects."""
 
 MAX_COSINES = 80
 """Largest number of cosines of a walk or of flicker: one for some seconds of a session
@@ -103,8 +105,8 @@ AXES_TURNED = 0.1
 """Typical rotation between two sets of axes that are taken as the same, rad."""
 
 UPRIGHT, UNSEEN = 10.0, np.repeat([0.5, 0.01], 3)
-"""Possible offset of a channel that the reference does not measure, m/s^2 and rad/s:
-gravity along the upright axis, and three degrees of it along the level axes."""
+"""Possible offset of a channel that the reference does not measure: gravity along the
+upright axis, and three degrees of it along the level axes."""
 
 SMALL_ROTATION = 1.0
 """Prior standard deviation of the rotations of an unknown orientation, rad: any."""

@@ -139,8 +139,7 @@ def _sideways(vectors: Array, angles: Array) -> Array:
     Along the two vectors perpendicular to each, which are as long as it is.
     """
     one, two = perpendicular_vectors(vectors)
-    out: Array = angles[:, :1] * one + angles[:, 1:] * two
-    return out
+    return angles[:, :1] * one + angles[:, 1:] * two
 
 
 def tilt_positions(x: Experience, attitude: Array) -> Experience:

@@ -104,7 +104,7 @@ of three degrees."""
 USEFUL_TURNED = 0.01
 """The same of the scale factor of gyroscopes where turns give it: makers do better."""
 
-MOVED_WRONG = 5.0
+MOVED_WRONG = DECIDES
 """Sigmas by which a parameter may move with what is left out before it is no longer to
 be used: no navigator has that in its margin."""
 
@@ -116,7 +116,7 @@ LOOKED_AT = 0.01
 """Probability below which an explanation, or that a window is bad, is not looked at: it
 moves no interval."""
 
-SUSPECT = 0.1
+SUSPECT = MENTIONED
 """Probability that a window is bad from which it is reported."""
 
 CERTAIN = 1 - LOOKED_AT

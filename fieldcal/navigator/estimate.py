@@ -43,7 +43,9 @@ from fieldcal.navigator.solution import NavigatorRun
 NAMES = tuple(f"{g}.{x}" for g in ("acc_bias", "acc_scale", "gyr_bias") for x in "xyz")
 UNITS = ("m/s^2",) * 3 + ("1",) * 3 + ("rad/s",) * 3
 
-PRIOR_SIGMAS = 3.0 * np.repeat([priors.BIAS_ACC, priors.SCALE, priors.BIAS_GYR], 3)
+PRIOR_SIGMAS = 3.0 * np.concatenate(
+    [priors.BIAS[:3], [priors.SCALE] * 3, priors.BIAS[3:]]
+)
 """Prior standard deviations: a few times those of consumer grade."""
 
 PASSES = 2

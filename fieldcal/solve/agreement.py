@@ -14,15 +14,15 @@ fit without it. Source: Rasmussen and Williams 2006, 5.4.2, for (1).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.physics.effect import Motion, Sensor
-from fieldcal.solve.observations import Mask
 from fieldcal.solve.parameter_set import ParameterSet
 
 MAX_ROUNDED_LENGTH = 1e-9
@@ -172,7 +172,7 @@ def _least_chi2(stated: Array, free: Array, y: Array) -> tuple[float, int]:
     return float(rest @ rest), int(rank)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _MeasuredMeans:
     """Means of a triad that were measured.
 
@@ -205,16 +205,10 @@ class _MeasuredMeans:
         for i in np.flatnonzero(self.freely_rotated).tolist():
             out[i] = [self._force_direction(i) @ np.nan_to_num(out[i]), np.nan, np.nan]
         if unsure is not None and 0 in self.channels:
+            most = MAX_PREDICTION_VARIANCE * self.d.unit[0] ** 2
             for i in range(len(out)):
-                n = (
-                    self._force_direction(i)[None]
-                    if self.freely_rotated[i]
-                    else np.eye(3)
-                )
-                if (
-                    np.trace(n @ unsure[i] @ n.T)
-                    > MAX_PREDICTION_VARIANCE * self.d.unit[0] ** 2
-                ):
+                n = self._directions(i)
+                if np.trace(n @ unsure[i] @ n.T) > most:
                     out[i] = np.nan
         return out
 
@@ -222,17 +216,20 @@ class _MeasuredMeans:
         """Sigmas of the residuals in `as_table`, from covariances (p, 3, 3)."""
         out = np.full((len(self.d.window_positions), 3), np.nan)
         for i in np.flatnonzero(self.used.reshape(-1, 3).all(axis=1)).tolist():
-            n = self._force_direction(i)[None] if self.freely_rotated[i] else np.eye(3)
+            n = self._directions(i)
             out[i, : len(n)] = np.sqrt(np.diag(n @ unsure[i] @ n.T))
         return out
 
-    @property
+    @cached_property
     def freely_rotated(self) -> Mask:
-        """Windows whose outputs unknown rotations change (p,)."""
-        loose = self.gram.free_rotations[
-            : len(self.d.window_positions), list(self.channels)
-        ]
+        """Windows whose outputs unknown rotations change, (p,)."""
+        held = len(self.d.window_positions)
+        loose = self.gram.free_rotations[:held, list(self.channels)]
         return np.asarray(loose.any(axis=(1, 2)))
+
+    def _directions(self, i: int) -> Array:
+        """Directions in which a window has residuals, (1 or 3, 3)."""
+        return self._force_direction(i)[None] if self.freely_rotated[i] else np.eye(3)
 
     def _force_direction(self, i: int) -> Array:
         """Direction in which no unknown rotation changes the outputs, (3,).

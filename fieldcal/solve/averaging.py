@@ -3,7 +3,7 @@
 The recording may show effects in addition to the requested parameters, with several
 possible explanations. Each explanation gives an estimate. The calibration is their
 mean, and its covariance includes their differences, (1) of `explanations`. Biases
-that change are stated for the end of the recording, (2) of `explanations`.
+that change are stated for the end of the recording, (1) of `end_values`.
 """
 
 from __future__ import annotations
@@ -99,11 +99,9 @@ def average_explanations(
 def _parameters_at_end(
     parameter_set: ParameterSet, mixture: Mixture, nominal: State
 ) -> tuple[Array, Array]:
-    """Parameters of one explanation at the end of the recording, (2)."""
-    picked, before = (
-        parameter_matrix(parameter_set, mixture.columns),
-        _nominal_values(parameter_set, nominal),
-    )
+    """Parameters of an explanation at the end of the recording (`end_values`)."""
+    picked = parameter_matrix(parameter_set, mixture.columns)
+    before = _nominal_values(parameter_set, nominal)
     return before + picked @ mixture.mean, picked @ mixture.covariance @ picked.T
 
 
@@ -111,9 +109,8 @@ def parameter_matrix(parameter_set: ParameterSet, columns: Index) -> Array:
     """Derivative of the parameters by some columns, (k, c)."""
     picked = np.zeros((len(parameter_set.names), len(columns)))
     for i, name in enumerate(parameter_set.names):
-        picked[i, np.flatnonzero(columns == parameter_set.columns_for(name)[0])[0]] = (
-            1.0
-        )
+        own = parameter_set.column_by_name[name]
+        picked[i, np.flatnonzero(columns == own)[0]] = 1.0
         parameter = ParameterName.of(name)
         if parameter.sensor:
             scale, c = parameter.is_scale, parameter.channel
@@ -150,7 +147,7 @@ def select_determined(
     """Names, values, covariance and shifts of determined parameters; other names."""
     before = np.zeros(parameter_set.width)
     for group in parameter_set.groups:
-        before[group.columns] = group.prior_sigma(group.fixed_size or 1.0)
+        before[group.columns] = group.own_sigma()
     sigma = np.sqrt(np.diag(found.covariance))
     limits = thresholds.USEFUL | (
         {"gyr_scale": thresholds.USEFUL_TURNED} if parameter_set.options.turned else {}
@@ -159,7 +156,7 @@ def select_determined(
         i
         for i, name in enumerate(parameter_set.names)
         if sigma[i] ** 2
-        < thresholds.DETERMINED * before[parameter_set.columns_for(name)[0]] ** 2
+        < thresholds.DETERMINED * before[parameter_set.column_by_name[name]] ** 2
         and sigma[i] < limits.get(group_of(name), np.inf)
     ]
     names = tuple(parameter_set.names[i] for i in known)

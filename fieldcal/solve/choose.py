@@ -23,10 +23,7 @@ from fieldcal.calibration.names import Tilt
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.model import priors
 from fieldcal.solve import printed
-from fieldcal.solve.estimation import (
-    ParameterEstimate,
-    RecordedRows,
-)
+from fieldcal.solve.estimation import ParameterEstimate, RecordedRows
 from fieldcal.solve.latitude import VerticalEarthRate
 from fieldcal.solve.lot_contribution import combine_with_lot
 from fieldcal.solve.observations import Observations

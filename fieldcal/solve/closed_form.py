@@ -18,13 +18,56 @@ The print has -g cos a sin b in the third line of (5) and with it (Uz0 - Uz2) in
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from fieldcal.core.errors import NotObservable
-from fieldcal.core.samples import ACC, Array
+from fieldcal.core.samples import ACC, Array, Mask
 from fieldcal.model.causes.planned import ACC_CALIBRATION
-from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
 from fieldcal.solve.observations import Observations
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedFormEstimate:
+    """Parameters with the covariance that follows from that of the windows.
+
+    Attributes
+    ----------
+    names : (p,) full names, ``group.component``
+    values, covariance : (p,), (p, p)
+
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+
+    @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        gain: Array,
+        observations: Observations,
+        channels: slice,
+    ) -> ClosedFormEstimate:
+        """Make the estimate from derivatives (p, n, 3) by the means of a triad."""
+        noise = observations.covariance[:, channels, channels]
+        values = np.einsum("pnc,nc->p", gain, observations.mean[:, channels])
+        covariance = np.einsum("pnc,ncd,qnd->pq", gain, noise, gain)
+        return cls(tuple(names), values, covariance)
+
+    def subset(self, kept: Mask) -> ClosedFormEstimate:
+        """Keep some of the parameters, (p,) bool."""
+        rows = np.flatnonzero(kept)
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in rows),
+            values=self.values[rows],
+            covariance=self.covariance[np.ix_(rows, rows)],
+        )
+
 
 MIN_FORCE_DIFFERENCE = 1e-4
 """Least difference of specific force between the positions, as a share of gravity."""
@@ -79,5 +122,4 @@ def printed_forces(observations: Observations) -> Array:
     """Forces by (5) as printed, with its error, in device axes, (n, 3) m/s^2."""
     f = observations.forces @ observations.mounting.T
     f[:, 2] *= -1.0
-    printed: Array = f @ observations.mounting
-    return printed
+    return f @ observations.mounting

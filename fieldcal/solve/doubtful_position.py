@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from fieldcal.core.samples import Array
@@ -40,7 +40,7 @@ class DoubtfulPosition:
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of result.json."""
-        return {"name": self.name, "probability": self.probability}
+        return asdict(self)
 
     @property
     def sentence(self) -> str:

@@ -17,7 +17,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.sets import Sets
-from fieldcal.model.evidence.two_grades import chances_of_coarser
+from fieldcal.model.evidence.unfitted_groups import chances_of_coarser
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.row_source import RowSource
@@ -32,7 +32,8 @@ from fieldcal.solve.averaging import (
     parameter_matrix,
     select_determined,
 )
-from fieldcal.solve.explanations import WeightedExplanation, bias_scale_at_end
+from fieldcal.solve.end_values import bias_scale_at_end
+from fieldcal.solve.explanations import WeightedExplanation
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
 from fieldcal.solve.settling import settle_without_bad_windows
@@ -111,6 +112,11 @@ class ParameterEstimate:
     contradicted_turns: tuple[tuple[int, int], ...] = ()
     wrong_angles: tuple[WrongAngles, ...] = ()
 
+    @property
+    def sigma(self) -> Array:
+        """Standard uncertainties, (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
     def with_model_uncertainty(
         self, one: ParameterEstimate, other: ParameterEstimate, weight: float
     ) -> ParameterEstimate:
@@ -149,11 +155,7 @@ class ParameterEstimate:
     def coarser_probabilities(self, stated: FactoryErrors) -> dict[str, float]:
         """Probability that each kind of error is as in the set, and not as stated."""
         state = self.sets.evaluate(self.parameter_set.members).state
-        left = [
-            group
-            for _, group in self.parameter_set.base_members
-            if group.cause == "factory"
-        ]
+        left = [g for _, g in self.parameter_set.base_members if g.cause == "factory"]
         return chances_of_coarser(
             state, left, self.parameter_set.options.factory, stated
         )
@@ -199,10 +201,8 @@ class ParameterEstimate:
         """Sum of squares of the normalised closures of turns, and their number."""
         full = np.zeros(self.parameter_set.width)
         np.add.at(full, self.mixture.columns, self.mixture.mean)
-        off = [
-            (t.closure - t.design @ full[t.columns]) ** 2 * t.info
-            for t in self.turn_rows
-        ]
+        turns = self.turn_rows
+        off = [(t.closure - t.design @ full[t.columns]) ** 2 * t.info for t in turns]
         white = np.concatenate([np.zeros(0), *off])
         return float(white.sum()), len(white)
 

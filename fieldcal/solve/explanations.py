@@ -6,14 +6,8 @@ result is the mean over the explanations,
 
     mean = sum_E P(E) mean_E,   cov = sum_E P(E) [cov_E + off_E off_E^T]           (1)
 
-so an interval includes the uncertainty of the cause. Biases and scale factors that
-change are given at the end of the recording, at the temperature of its last window and
-with the device at rest, as a flight would start with them. With the outputs U(f, w) of
-the added causes at that instant,
-
-    bias = U(0, 0),   scale_c = [U_c(+d e_c) - U_c(-d e_c)] / 2 d,   d -> 0        (2)
-
-Source: Hoeting, Madigan, Raftery and Volinsky 1999 for (1).
+so an interval includes the uncertainty of the cause. Source: Hoeting, Madigan, Raftery
+and Volinsky 1999 for (1).
 """
 
 from __future__ import annotations
@@ -22,12 +16,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-import numpy as np
-
 from fieldcal.calibration.names import TILTS
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS
 from fieldcal.model import priors, thresholds
-from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import (
@@ -39,21 +30,10 @@ from fieldcal.model.causes.random_causes import random_causes
 from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.state import State
 from fieldcal.physics.effect import Motion, Scatter, Sensor
-from fieldcal.physics.experience_rows import select_rows
-from fieldcal.physics.joint_turns import JointTurns
-from fieldcal.solve.warm_scales import WARM_SCALE
 
 MAX_SUBSET_PARAMETERS = 3
 """Largest number of parameters of which subsets are taken as variants."""
-
-CHANGING = ("time", "temperature", "force and time", "flicker", WARM_SCALE)
-"""Functions without physics whose value at the end belongs to the biases and scale
-factors there; functions of angles and forces have no zero."""
-
-DERIVATIVE_STEP = 1e-3
-"""d of (2), m/s^2 and rad/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +89,8 @@ def translate_explanations(
         both_tilts = bool(has & unseen) and unseen <= {
             cause.name for cause, _ in explanation.members
         }
-        kept = [
-            m
-            for m in explanation.members
-            if _is_missing(m, has if both_tilts else has | unseen)
-        ]
+        known = has if both_tilts else has | unseen
+        kept = [m for m in explanation.members if _is_missing(m, known)]
         own |= {group: cause for cause, group in kept}
         key = frozenset(group for _, group in kept)
         total[key] = total.get(key, 0.0) + explanation.probability
@@ -267,56 +244,3 @@ def _with_parameters(whole: Group, params: tuple[int, ...]) -> Group:
 def has_equation(group: Group) -> bool:
     """Whether the group belongs to an effect that has an equation."""
     return isinstance(group.effect, Motion | Sensor)
-
-
-def bias_scale_at_end(d: Dictionary, shown: Sequence[WeightedExplanation]) -> Array:
-    """Derivative of biases and scale factors at the end by the columns of `d`, (2).
-
-    Returns (2, 6, k): biases and scale factors, by output and column. Columns that do
-    not belong to the explanations have 0.
-    """
-    out = np.zeros((2, 6, d.width))
-    changing = np.zeros(d.width, dtype=bool)
-    for explanation in shown:
-        for cause, group in (*explanation.members, *explanation.possible_members):
-            if not isinstance(group.effect, Motion) and (
-                group.effect is not None or cause.name in CHANGING
-            ):
-                for each in cause.variants if has_equation(group) else (group,):
-                    changing[each.columns] = True
-    if not changing.any():
-        return out
-    out[0] = _end_outputs(d, changing, np.zeros(6))
-    for c in range(6):
-        step = DERIVATIVE_STEP * np.eye(6)[c]
-        up, down = (_end_outputs(d, changing, s * step)[c] for s in (1.0, -1.0))
-        out[1, c] = (up - down) / (2 * DERIVATIVE_STEP)
-    return out
-
-
-def _end_outputs(d: Dictionary, changing: Array, felt: Array) -> Array:
-    """Outputs by column, (6, k), at the end of the recording for inputs f, w, (6,).
-
-    The last turn is taken as long ago, so that motion of the joints is excluded.
-    """
-    x = select_rows(d.x, [int(np.argmax(d.x.t))])
-    nothing, rest = np.zeros((1, 3)), float(d.x.lasts[int(np.argmax(d.x.t))]) / 2
-    x = replace(
-        x, t=x.t + rest, since_start=x.since_start + rest, lasts=np.zeros(1),
-        f=felt[None, :3], w=felt[None, 3:], w_dot=nothing, variance=nothing,
-        heating=np.zeros(1), since_turn=np.full(1, np.inf),
-        joint_turns=JointTurns.none(),
-    )  # fmt: skip
-    nowhere = State(
-        np.zeros(6), np.ones(6), np.zeros((d.position_count, 2)), np.zeros(3)
-    )
-    view = RowView(x, x, np.full((len(d.since), 1), np.inf), nowhere)
-    out = np.zeros((6, d.width))
-    for first, end, basis in d.basis_ranges():
-        if not changing[first:end].any():
-            continue
-        row = basis.evaluate(view)[0]
-        out[:, first:end] = (
-            np.kron(np.eye(6), row) if isinstance(basis, Course) else row
-        )
-    return np.where(changing, out, 0.0)

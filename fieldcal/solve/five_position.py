@@ -30,7 +30,7 @@ import numpy as np
 
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import ACC, Array
-from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
+from fieldcal.solve.closed_form import ClosedFormEstimate
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import determined_parameters
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import GYR
-from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
+from fieldcal.solve.closed_form import ClosedFormEstimate
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import determined_parameters
 

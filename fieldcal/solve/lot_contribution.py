@@ -91,13 +91,11 @@ class LotContribution:
 
     def _largest_shift(self) -> str:
         """Sentence part: the largest difference of the unit from its lot."""
-        known = [n for n in self.lot.names if n in self.own]
+        rows = zip(self.lot.names, self.lot.mean, self.lot.sigma, strict=True)
         off = {
             n: (self.own[n][0] - m) / np.hypot(self.own[n][1], s)
-            for n, m, s in zip(
-                self.lot.names, self.lot.mean, self.lot.sigma, strict=True
-            )
-            if n in known
+            for n, m, s in rows
+            if n in self.own
         }
         name = self.outlier_parameter or max(off, key=lambda n: abs(off[n]), default="")
         if name not in off:
@@ -144,40 +142,27 @@ def combine_with_lot(
 ) -> tuple[ParameterEstimate, LotContribution | None]:
     """The estimate with the lot, or without it if the unit is an outlier.
 
-    The contribution is None if unit and lot have no parameter in common.
-
-    Parameters
-    ----------
-    own, with_lot : estimates without the lot and with it
-    lot : prior from the lot
-
+    `own` is the estimate without the lot. The contribution is None if unit and lot have
+    no parameter in common.
     """
     lot = lot.subset([n for n in with_lot.names if n in own.parameter_set.names])
     if not lot.names:
         return own, None
     others = _OutlierHypotheses.of(own, lot)
-    kept = (
-        own
-        if others.outlier_probability > thresholds.NAMED
-        else others.mixture_with(with_lot)
-    )
+    odd = others.outlier_probability > thresholds.NAMED
+    kept = own if odd else others.mixture_with(with_lot)
     lot = lot.subset(kept.names)
     contribution = LotContribution(
-        lot,
-        others.outlier_probability,
-        others.outlier_parameter,
-        _estimates(own),
+        lot, others.outlier_probability, others.outlier_parameter, _estimates(own),
         _estimates(kept),
-    )
+    )  # fmt: skip
     return kept, contribution
 
 
 def _estimates(estimate: ParameterEstimate) -> dict[str, tuple[float, float]]:
     """Value and sigma of each parameter by its full name."""
-    rows = zip(
-        estimate.values.tolist(), np.sqrt(np.diag(estimate.covariance)), strict=True
-    )
-    return {n: (v, float(s)) for n, (v, s) in zip(estimate.names, rows, strict=True)}
+    pairs = zip(estimate.values.tolist(), estimate.sigma.tolist(), strict=True)
+    return dict(zip(estimate.names, pairs, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,10 +245,7 @@ def _hypothesis_priors(
     for j, name in enumerate(lot.names):
         spread = wide.copy()
         spread[j, j] += more * wide[j, j]
-        yield (
-            name,
-            float(lot.outlier_probability[j] / (1 - lot.outlier_probability[j])),
-            spread,
-        )
+        odd = float(lot.outlier_probability[j])
+        yield name, odd / (1 - odd), spread
     odd = float(lot.outlier_probability.mean())
     yield ALL_PARAMETERS, odd / (1 - odd), (1 + more) * wide

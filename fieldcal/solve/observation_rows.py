@@ -18,7 +18,7 @@ from fieldcal.core.positions import attitude_sigmas, gamma_angles, unknown_axis_
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.orientation import force_along_mean
-from fieldcal.model.rows.turntable import GyroReadings
+from fieldcal.model.rows.turntable import GyroReadings, unknown_earth_rate
 from fieldcal.physics.experience import Experience
 from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.observations import Observations
@@ -132,9 +132,3 @@ def _measured_force(observations: Observations) -> Array:
         observations.gravity
     )
     return force_along_mean(observations.gravity, np.arange(len(observations)), apart)
-
-
-def unknown_earth_rate(scale: Array | tuple[float, ...]) -> Array:
-    """Error from the Earth's rate in unknown orientations, 1 sigma, (3,) outputs."""
-    size: Array = EARTH_RATE / np.sqrt(3) * np.abs(np.asarray(scale))
-    return size

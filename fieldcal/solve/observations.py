@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.calibration import Nominal
 from fieldcal.core.base_motion import BaseMotion
@@ -24,11 +22,9 @@ from fieldcal.core.positions import (
     specific_forces,
     table_rates,
 )
-from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array
+from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Index, Mask
 from fieldcal.windows import Average
 
-Index = NDArray[np.integer[Any]]
-Mask = NDArray[np.bool_]
 MIN_EIGENVALUE = 1e-6
 """Least eigenvalue of a correlation matrix that is taken as known."""
 
@@ -101,18 +97,13 @@ class Observations:
         if not averages:
             raise InputError("there is no position with a window: take at least two")
         return cls(
-            tuple(positions),
-            np.array([a.mean for a in averages]),
-            np.array([_regularised(a.covariance) for a in averages]),
-            gravity,
+            tuple(positions), np.array([a.mean for a in averages]),
+            np.array([_regularised(a.covariance) for a in averages]), gravity,
             np.array([a.temperature for a in averages]),
-            np.array([(a.start + a.end) / 2 for a in averages]),
-            latitude,
-            np.eye(3) if mounting is None else mounting,
-            grade,
-            nominal or Nominal(),
+            np.array([(a.start + a.end) / 2 for a in averages]), latitude,
+            np.eye(3) if mounting is None else mounting, grade, nominal or Nominal(),
             base_motion or BaseMotion(),
-        )
+        )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -121,13 +112,10 @@ class Observations:
         """Return the observations of some positions."""
         rows = np.asarray(rows, dtype=int)
         return replace(
-            self,
-            positions=tuple(self.positions[i] for i in rows),
-            mean=self.mean[rows],
-            covariance=self.covariance[rows],
-            temperature=self.temperature[rows],
-            time=self.time[rows],
-        )
+            self, positions=tuple(self.positions[i] for i in rows),
+            mean=self.mean[rows], covariance=self.covariance[rows],
+            temperature=self.temperature[rows], time=self.time[rows],
+        )  # fmt: skip
 
     @property
     def has_acc(self) -> bool:
@@ -158,8 +146,7 @@ class Observations:
     @property
     def forces(self) -> Array:
         """Specific force at rest in device axes, (n, 3) m/s^2."""
-        forces: Array = specific_forces(self.positions, self.gravity) @ self.mounting
-        return forces
+        return specific_forces(self.positions, self.gravity) @ self.mounting
 
     @property
     def known_latitude(self) -> float:
@@ -181,8 +168,7 @@ class Observations:
     @property
     def rates(self) -> Array:
         """Known rates of a rate table in device axes, (n, 3) rad/s; 0 at rest."""
-        rates: Array = table_rates(self.positions) @ self.mounting
-        return rates
+        return table_rates(self.positions) @ self.mounting
 
     def _check_shapes(self, n: int) -> None:
         shapes = {

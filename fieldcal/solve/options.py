@@ -22,23 +22,10 @@ TILT_CHOICES = ("auto", "none", *TILTS)
 
 @dataclass(frozen=True, slots=True)
 class SolveOptions:
-    """Options of a requested calibration; angles are 1 sigma.
+    """Options of a requested calibration, those of `choose.solve`.
 
-    Attributes
-    ----------
-    method, tilt : by name, or "auto"
-    cross : whether cross-coupling is estimated
-    as_printed : use the closed forms with the misprints of the paper
-    level_deg, heading_deg : uncertainty of the level of the base, and of the direction
-        of z from north; None if not stated
-    angles_deg : uncertainty of the set angles of each position
-    beside_tilt_deg : possible size of the other kind of tilt: a tilt of the base beside
-        offsets of the joints, or the other way round
-    lot : prior from the unit's production lot; None if not used
-    factory : sizes of the errors that the factory left and that are not estimated
-    at_best : the same for the stated grade, if biases show a coarser one; each kind of
-        error then has one of the two sizes
-
+    `level_deg`, `heading_deg`, `angles_deg` and `beside_tilt_deg` are what it calls
+    `level_sigma_deg` and so on: 1 sigma, None if not stated.
     """
 
     method: Method | Literal["auto"] = "auto"

@@ -16,25 +16,21 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.calibration.lot_prior import LotPrior
-from fieldcal.calibration.names import TILTS, ParameterName, Tilt, group_of
+from fieldcal.calibration.names import TILTS, Tilt, group_of
 from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
-from fieldcal.core.samples import CHANNELS, Array, Index
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.model import priors
-from fieldcal.model.causes import columns
 from fieldcal.model.causes.basis import General, RowView
-from fieldcal.model.causes.cause import TRIADS, Cause, Group
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import effect_group, factory_groups
+from fieldcal.model.causes.effect_causes import effect_group
+from fieldcal.model.causes.factory_groups import factory_groups
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.averages import Rows
-from fieldcal.physics.effect import Effect
-from fieldcal.solve.explanations import (
-    WeightedExplanation,
-    bias_scale_at_end,
-    translate_explanations,
-)
+from fieldcal.solve.end_values import bias_scale_at_end
+from fieldcal.solve.explanations import WeightedExplanation, translate_explanations
 from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
 
@@ -105,9 +101,8 @@ class ParameterSet(Dictionary):
     ) -> None:
         self.options, self.cut = wanted, np.array(cut, dtype=float)
         self.sign = _mean_signs(rows, self.cut)
-        held = np.unique(rows.x.position)
-        common = np.array([rows.window_error[rows.x.position == p][0] for p in held])
-        wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
+        common = rows.error_by_window
+        wander = Wander.of(rows, unit) if len(rows.x) > len(common) else Wander.none()
         super().__init__(
             rows.x, rows.used, since, common, unit, turns, wander, rows.session_error
         )
@@ -158,18 +153,14 @@ class ParameterSet(Dictionary):
 
     def _calibration(self) -> Iterator[Group]:
         """Bias and scale factor, free."""
-        sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
-        for part, channels in TRIADS:
-            at = np.intersect1d(channels, self.observed)
-            if not len(at):
-                continue
-            free = priors.FREE_SIZE
+        sizes, free = priors.BIAS * self.unit, priors.FREE_SIZE
+        for part, at in self.triads:
             yield Group("bias", part, self.bias + at, sizes[at], fixed_size=free,
                         in_state=True)  # fmt: skip
             if part == "acc" or self.options.gyr_scale:
                 size = priors.SCALE * self.unit[at]
-                yield Group("scale", part, self.scale + at, size,
-                            fixed_size=priors.FREE_SIZE, in_state=True)  # fmt: skip
+                yield Group("scale", part, self.scale + at, size, fixed_size=free,
+                            in_state=True)  # fmt: skip
 
     def _causes(self) -> Iterator[Cause]:
         """Causes of the requested parameters, and of errors of known size."""
@@ -193,7 +184,7 @@ class ParameterSet(Dictionary):
         if w.angles_deg:
             yield from self._angle_causes(float(np.deg2rad(w.angles_deg)))
         if (lost := np.flatnonzero(self.cut)).size:
-            at = self.add(General("cut", self._truncated_outputs), 3) + lost
+            at = self.add(General("cut", self._truncated_outputs), 3)[lost]
             yield _given_cause(
                 Group("rounding", "acc", at, self.cut[lost], fixed_size=1.0)
             )
@@ -231,18 +222,9 @@ class ParameterSet(Dictionary):
 
     def _earth_rate_cause(self, size: Array) -> Cause:
         """Uncertainty of the Earth's rate."""
-        sides = columns.earth_sides
-        self.earth = self.add(General("earth", columns.earth, sides=sides), 3)
-        kept = np.flatnonzero(size)
+        at, kept = self.add_earth(), np.flatnonzero(size)
         return _given_cause(
-            Group(
-                "earth",
-                "",
-                self.earth + kept,
-                size[kept],
-                fixed_size=1.0,
-                in_state=True,
-            )
+            Group("earth", "", at[kept], size[kept], fixed_size=1.0, in_state=True)
         )
 
     def _truncated_outputs(self, view: RowView) -> Array:
@@ -277,44 +259,27 @@ class ParameterSet(Dictionary):
 
     # -- places of the parameters
 
-    def columns_for(self, name: str) -> Index:
-        """Columns of a parameter by its full name; none if it is not in the set."""
-        parameter = ParameterName.of(name)
-        if parameter.sensor:
-            kind = "scale" if parameter.is_scale else "bias"
-            every = [c for g in self.always if g.cause == kind for c in g.columns]
-            first = self.scale if parameter.is_scale else self.bias
-            at = first + parameter.channel
-            return np.array([at] if at in every else [], dtype=np.intp)
+    @cached_property
+    def column_by_name(self) -> dict[str, int]:
+        """Column of each parameter by its full name."""
+        first, out = {"bias": self.bias, "scale": self.scale}, dict[str, int]()
+        for group in self.always:
+            for column in group.columns.tolist() if group.cause in first else ():
+                axis = CHANNELS[column - first[group.cause]][-1]
+                out[f"{group.part}_{group.cause}.{axis}"] = column
         for cause, group in self.base_members:
-            if cause.name == parameter.group and isinstance(group.effect, Effect):
-                names = [group.effect.params[j].name for j in group.params]
-                if parameter.component in names:
-                    return group.columns[[names.index(parameter.component)]]
-        return np.empty(0, dtype=np.intp)
+            for name, column in zip(group.names, group.columns.tolist(), strict=False):
+                out[f"{cause.name}.{name}"] = column
+        return out
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Full names of all parameters, in the order of results."""
-        sensors = [("acc", (0, 1, 2), "cross_coupling"),
-                   ("gyr", (3, 4, 5), "gyro_cross_coupling")]  # fmt: skip
-        out: list[str] = []
-        for sensor, channels, cross in sensors:
-            axes = [CHANNELS[c][-1] for c in channels if c in self.observed]
-            groups = [f"{sensor}_bias", f"{sensor}_scale"]
-            out += [f"{g}.{a}" for g in groups for a in axes]
-            out += self._effect_names(cross)
-            if sensor == "acc":
-                out += self._effect_names(self.options.tilt)
-        return tuple(n for n in out if len(self.columns_for(n)))
-
-    def _effect_names(self, name: str) -> list[str]:
-        return [
-            f"{name}.{group.effect.params[j].name}"
-            for cause, group in self.base_members
-            if cause.name == name and isinstance(group.effect, Effect)
-            for j in group.params
-        ]
+        groups = (
+            *("acc_bias", "acc_scale", "cross_coupling", self.options.tilt),
+            *("gyr_bias", "gyr_scale", "gyro_cross_coupling"),
+        )
+        return tuple(n for g in groups for n in self.column_by_name if group_of(n) == g)
 
 
 def _given_cause(group: Group) -> Cause:

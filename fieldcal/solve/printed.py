@@ -17,8 +17,7 @@ from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.solve import least_squares
-from fieldcal.solve.closed_form import two_position
-from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
+from fieldcal.solve.closed_form import ClosedFormEstimate, two_position
 from fieldcal.solve.five_position import five_position
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.options import SolveOptions
@@ -49,11 +48,9 @@ def solve(observations: Observations, options: SolveOptions) -> Calibration:
     if len(still) and observations.has_acc:
         two = len(still) == 2 if method == "auto" else method == "two_position"
         method = "two_position" if two else "five_position"
-        formulas, misprints = (
-            (two_position, TWO_POSITION_MISPRINTS)
-            if two
-            else (five_position, FIVE_POSITION_MISPRINTS)
-        )
+        formulas, misprints = five_position, FIVE_POSITION_MISPRINTS
+        if two:
+            formulas, misprints = two_position, TWO_POSITION_MISPRINTS
         parts.append(formulas(observations[still], as_printed=True))
         sentences.append(misprints)
     if observations.has_gyr:
@@ -67,16 +64,11 @@ def solve(observations: Observations, options: SolveOptions) -> Calibration:
         place = slice(first, first := first + len(part.names))
         covariance[place, place] = part.covariance
     return Calibration(
-        method="least_squares" if method == "auto" else method,
-        names=names,
-        values=np.concatenate([p.values for p in parts]),
-        covariance=covariance,
-        units=tuple(UNITS[group_of(n)] for n in names),
-        chi2=0.0,
-        dof=0,
-        rms=float("nan"),
-        warnings=tuple(sentences),
-    )
+        method="least_squares" if method == "auto" else method, names=names,
+        values=np.concatenate([p.values for p in parts]), covariance=covariance,
+        units=tuple(UNITS[group_of(n)] for n in names), chi2=0.0, dof=0,
+        rms=float("nan"), warnings=tuple(sentences),
+    )  # fmt: skip
 
 
 def _check_supported(observations: Observations, options: SolveOptions) -> None:

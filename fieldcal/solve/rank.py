@@ -11,14 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.positions import Position
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.model.causes.planned import design_matrix
 from fieldcal.solve.observations import Observations
-
-Mask = NDArray[np.bool_]
 
 RCOND = 1e-7
 """Ratio of singular values below which a direction counts as not determined."""

@@ -18,7 +18,7 @@ of a joint in proportion.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -77,13 +77,7 @@ class WrongAngles:
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of result.json."""
-        return {
-            "joint": self.joint,
-            "angle_deg": self.angle_deg,
-            "position": self.position,
-            "shows": self.shows,
-            "moves": dict(self.moves),
-        }
+        return asdict(self)
 
     @classmethod
     def from_json(cls, value: Mapping[str, Any]) -> WrongAngles:
@@ -103,11 +97,8 @@ def wrong_angles(
     picked : (k, c) derivative of the parameters by the columns of the estimate
 
     """
-    own = [
-        g
-        for _, g in parameter_set.base_members
-        if g.cause == "angle_setting" and g.part == "own"
-    ]
+    given = (g for _, g in parameter_set.base_members if g.cause == "angle_setting")
+    own = [g for g in given if g.part == "own"]
     if not own:
         return []
     order = np.argsort(mixture.columns)

@@ -53,44 +53,30 @@ def build_calibration(
     """
     names = estimate.names
     sentences = [
-        _effects_sentence(estimate),
+        words.effects_warning(
+            estimate.any_cause_probability, estimate.causes, names,
+            estimate.shift_sigmas, estimate.valid_at_s,
+        ),
         lot_contribution.sentence if lot_contribution else "",
         *_remarks(method, observations, options, estimate, notes),
-    ]
+    ]  # fmt: skip
     if not names:
         raise NotObservable(
             "these positions determine nothing: " + "; ".join(filter(None, sentences))
         )
-    of_acc = any(map(_is_acc, names))
+    of_acc = any(sensor_of(group_of(name)) == "acc" for name in names)
     odd = _reasons_against(observations, estimate, of_acc)
     sentences += agreement_warnings(method, observations, estimate)
     fit = estimate.acc if of_acc else estimate.gyr
     info = _info(method, observations, options, estimate)
     info |= {"borrowed": lot_contribution.to_json()} if lot_contribution else {}
     return Calibration(
-        method=method,
-        names=names,
-        values=estimate.values,
-        covariance=estimate.covariance,
-        units=tuple(UNITS[group_of(n)] for n in names),
-        chi2=fit.chi2,
-        dof=fit.dof,
-        rms=estimate.acc.rms,
-        warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
-        good=not odd,
+        method=method, names=names, values=estimate.values,
+        covariance=estimate.covariance, units=tuple(UNITS[group_of(n)] for n in names),
+        chi2=fit.chi2, dof=fit.dof, rms=estimate.acc.rms,
+        warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)), good=not odd,
         info=info,
-    )
-
-
-def _effects_sentence(estimate: ParameterEstimate) -> str:
-    """Sentence on the effects that were estimated beside the parameters."""
-    return words.effects_warning(
-        estimate.any_cause_probability,
-        estimate.causes,
-        estimate.names,
-        estimate.shift_sigmas,
-        estimate.valid_at_s,
-    )
+    )  # fmt: skip
 
 
 def _remarks(
@@ -117,44 +103,25 @@ def _reasons_against(
 
     `of_acc` states whether parameters of the accelerometers are estimated.
     """
-    names, sigma = estimate.names, np.sqrt(np.diag(estimate.covariance))
+    nominal, names = observations.nominal, [p.name for p in observations.positions]
+    turns = [(names[before], names[behind])
+             for before, behind in estimate.contradicted_turns]  # fmt: skip
+    rate = VerticalEarthRate.of(
+        estimate.parameter_set, estimate.sets, observations.latitude
+    )
     return [
-        *implausible_values(names, estimate.values, sigma, observations.nominal),
-        *misdirected_turns(_turn_names(estimate.contradicted_turns, observations)),
-        *_wrong_latitude(estimate, observations),
+        *implausible_values(estimate.names, estimate.values, estimate.sigma, nominal),
+        *misdirected_turns(turns),
+        *([rate.sentence] if rate and rate.latitude_wrong else []),
         *contradiction_warnings(observations, estimate, of_acc),
     ]
 
 
-def _is_acc(name: str) -> bool:
-    """Whether a parameter is a bias or a scale factor of the accelerometers."""
-    return sensor_of(group_of(name)) == "acc"
-
-
-def _turn_names(
-    turns: Sequence[tuple[int, int]], observations: Observations
-) -> list[tuple[str, str]]:
-    """Turns by the names of the positions at their ends."""
-    names = [position.name for position in observations.positions]
-    return [(names[before], names[behind]) for before, behind in turns]
-
-
-def _wrong_latitude(
-    estimate: ParameterEstimate, observations: Observations
-) -> list[str]:
-    """Sentence if the gyroscopes contradict the stated latitude."""
-    shown = VerticalEarthRate.of(
-        estimate.parameter_set, estimate.sets, observations.latitude
-    )
-    return [shown.sentence] if shown and shown.latitude_wrong else []
-
-
 def _is_harmful(wrong: WrongAngles, estimate: ParameterEstimate) -> bool:
     """Whether wrong angles could move a parameter beyond its uncertainty."""
-    sigma = np.sqrt(np.diag(estimate.covariance))
     return any(
         abs(wrong.moves[name]) > thresholds.MOVED_WRONG * s
-        for name, s in zip(estimate.names, sigma, strict=True)
+        for name, s in zip(estimate.names, estimate.sigma, strict=True)
     )
 
 
@@ -165,11 +132,8 @@ def _carried_info(
     moved = dict(zip(estimate.names, estimate.shift_sigmas.tolist(), strict=True))
     out: dict[str, Any] = {"causes": estimate.causes, "moved_sigmas": moved}
     if estimate.valid_at_s is not None:
-        last = (
-            float(observations.temperature[-1])
-            if len(observations.temperature)
-            else np.nan
-        )
+        degrees = observations.temperature
+        last = float(degrees[-1]) if len(degrees) else np.nan
         warm = last if np.isfinite(last) else None
         out["as_of"] = {"since_start_s": estimate.valid_at_s, "temperature_degc": warm}
     return out

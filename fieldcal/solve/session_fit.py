@@ -117,11 +117,8 @@ class SessionFit:
         if (stated := self.options.at_best) is None:
             return estimate
         chances = estimate.coarser_probabilities(stated)
-        finer = {
-            k: getattr(stated, k)
-            for k, p in chances.items()
-            if p < COARSER_GRADE_CHANCE
-        }
+        likely = [k for k, p in chances.items() if p < COARSER_GRADE_CHANCE]
+        finer = {k: getattr(stated, k) for k in likely}
         if not finer:
             return estimate
         wanted = replace(wanted, factory=replace(wanted.factory, **finer))
@@ -143,18 +140,13 @@ class SessionFit:
             observations.grade == "navigation" and observations.latitude is not None
         )
         return ParameterSetOptions(
-            tilt,
-            cross=self.options.cross or self.method == "least_squares",
+            tilt, cross=self.options.cross or self.method == "least_squares",
             gyro_cross=table or turned,
             gyr_scale=table or turned or (sees_earth and len(observations) > 1),
-            level_deg=level,
-            beside_tilt_deg=0.0 if level else self._other_tilt_deg,
-            angles_deg=self.options.angles_deg,
-            factory=self.options.factory,
-            earth=self.earth_sigma,
-            turned=turned,
-            lot=self.options.lot,
-        )
+            level_deg=level, beside_tilt_deg=0.0 if level else self._other_tilt_deg,
+            angles_deg=self.options.angles_deg, factory=self.options.factory,
+            earth=self.earth_sigma, turned=turned, lot=self.options.lot,
+        )  # fmt: skip
 
     def _fit_best_tilt(self) -> tuple[ParameterEstimate, list[str]]:
         """Fit with the better model of the tilt; the covariance includes the other one.

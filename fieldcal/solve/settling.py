@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Sets
@@ -22,7 +22,6 @@ from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve.averaging import mixture_with_causes
-from fieldcal.solve.observations import Mask
 from fieldcal.solve.parameter_set import ParameterSet
 
 MAX_TURN_INTEGRATIONS, MIN_SCALE_CHANGE = 6, 0.01
@@ -88,9 +87,7 @@ def _settled_fit(
     """Fit of the likeliest explanation about the state to which other rows converge."""
     gram = fit.gram(*_settled_state(settling, parameter_set), None)
     return gram, mixture_with_causes(
-        parameter_set,
-        Sets(parameter_set, gram),
-        parameter_set.explanations[0].members,
+        parameter_set, Sets(parameter_set, gram), parameter_set.explanations[0].members
     )
 
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
-from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
+from fieldcal.core.samples import Array
+from fieldcal.model.evidence.eliminated import evidence_gains
 from fieldcal.model.evidence.sets import Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
 from fieldcal.solve.explanations import WeightedExplanation, has_equation
@@ -36,29 +36,18 @@ def variants(
 ) -> list[WeightedExplanation]:
     """Variants of an explanation, with their probabilities if it is the right one.
 
-    Parameters
-    ----------
-    sets : over the rows
-    known : the other members of the set
-    explanation : to be varied
-
+    `known` are the other members of the set.
     """
-    each = [
-        _choices(sets, (*known, *explanation.members), m) for m in explanation.members
-    ]
-    each += [
-        _with_and_without(sets, (*known, *explanation.members), m)
-        for m in explanation.possible_members
-    ]
+    whole = (*known, *explanation.members)
+    each = [_choices(sets, whole, m) for m in explanation.members]
+    each += [_with_and_without(sets, whole, m) for m in explanation.possible_members]
     share: dict[tuple[Member, ...], float] = {}
     points = spread_points(
         len(each), max(1, round(REPRESENTATIVE_POINTS * explanation.probability))
     )
     for at in points:
-        picked = [
-            choices[choice_at(weight, u)]
-            for u, (choices, weight) in zip(at, each, strict=True)
-        ]
+        pairs = zip(at, each, strict=True)
+        picked = [choices[choice_at(weight, u)] for u, (choices, weight) in pairs]
         members = tuple(m for chosen in picked for m in chosen)
         share[members] = share.get(members, 0.0) + 1 / len(points)
     return [WeightedExplanation(members, p) for members, p in share.items()]
@@ -118,7 +107,7 @@ def _scores(sets: Sets, members: tuple[Member, ...], member: Member) -> Array:
     """
     others, own = member[0].variants, member[1]
     every = np.unique(np.concatenate([g.columns for g in others]))
-    rest = _without_columns(sets, members, own.columns)
+    rest = sets.evaluate(members).state.without(own.columns)
     inner, rhs = rest.schur_complement(every, np.ones(len(every)))
     alone = np.diag(rest.rows.matrix(every, every))
     beside = [m for m in members if m[0].key != member[0].key]
@@ -127,9 +116,7 @@ def _scores(sets: Sets, members: tuple[Member, ...], member: Member) -> Array:
     for k in np.unique(width).tolist():
         alike = np.flatnonzero(width == k)
         at = np.searchsorted(every, [others[j].columns for j in alike])
-        size = np.array(
-            [others[j].prior_sigma(others[j].fixed_size or 1.0) for j in alike]
-        )
+        size = np.array([others[j].own_sigma() for j in alike])
         square = inner[at[:, :, None], at[:, None, :]]
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)
@@ -138,11 +125,3 @@ def _scores(sets: Sets, members: tuple[Member, ...], member: Member) -> Array:
         summed = np.logaddexp.reduce(gain + LOG_DENSITY, axis=1)
         score[alike] += np.where(known, gain[:, UNIT_INDEX], summed)
     return score
-
-
-def _without_columns(sets: Sets, members: tuple[Member, ...], own: Index) -> Eliminated:
-    """A set without some columns, with the instability of windows unchanged."""
-    full = sets.evaluate(members)
-    kept = ~np.isin(full.state.columns, own)
-    rows = sets.gram_at(full.sizes.instability)
-    return Eliminated.of(rows, full.state.columns[kept], full.state.prior_sigma[kept])

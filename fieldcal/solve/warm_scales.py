@@ -57,7 +57,7 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
         return out.reshape(len(out), 6, -1)
 
     count = ACC_OUTPUTS * len(which)
-    at = table.add(General(WARM_SCALE, columns), count) + np.arange(count)
+    at = table.add(General(WARM_SCALE, columns), count)
     wide = np.abs(np.outer(table.unit[:ACC_OUTPUTS], priors.SCALE_WARMING * size / G0))
     one = Group(
         WARM_SCALE, "", at, wide.ravel(), group.effect, group.shape, group.origin,
@@ -88,10 +88,7 @@ def _courses(table: ColumnTable, group: Group) -> tuple[Course, Index, Array]:
         raise TypeError(f"{group.cause} is no course of biases")
     channel, number = np.divmod(group.columns - first, basis.width)
     on_acc = channel < ACC_OUTPUTS
-    wide = (
-        group.prior_sigma(1.0 if group.fixed_size is None else group.fixed_size)
-        / table.unit[channel]
-    )
+    wide = group.own_sigma() / table.unit[channel]
     which, at = np.unique(number[on_acc], return_inverse=True)
     count = np.bincount(at, minlength=len(which))
     size = np.sqrt(np.bincount(at, wide[on_acc] ** 2, len(which)) / count)

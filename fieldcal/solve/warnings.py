@@ -41,13 +41,11 @@ def undetermined_warnings(
     if acc and estimate.parameter_set.options.level_deg is not None:
         acc = [n for n in acc if group_of(n) != "base_tilt"]
     if acc:
-        sentences.append(
-            _norm_warning(acc, estimate, len(observations))
-            if method == "scalar"
-            else words.not_determined(
-                acc, _remedy(observations, estimate), "these positions"
-            )
-        )
+        if method == "scalar":
+            sentences.append(_norm_warning(acc, estimate, len(observations)))
+        else:
+            cure = _remedy(observations, estimate)
+            sentences.append(words.not_determined(acc, cure, "these positions"))
         if not any(group_of(n) in OF_ACC for n in estimate.names):
             sentences.append(_force_length_warning(observations))
     gyr = [n for n in estimate.undetermined if group_of(n) == "gyr_scale"]
@@ -161,10 +159,8 @@ def agreement_warnings(
 ) -> list[str]:
     """Warnings about how well the windows agree."""
     doubt = DoubtfulPosition.of(observations, estimate.bad_probability)
-    few, scattered = (
-        _few_windows_warnings(method, estimate),
-        _scatter_warnings(estimate),
-    )
+    few = _few_windows_warnings(method, estimate)
+    scattered = _scatter_warnings(estimate)
     return [*few, doubt.sentence if doubt else "", *scattered]
 
 
@@ -216,20 +212,15 @@ def _scatter_warnings(estimate: ParameterEstimate) -> list[str]:
         (what, estimate.acc, (0, 1, 2)), ("gyroscopes' means", estimate.gyr, (3, 4, 5)),
     ):  # fmt: skip
         if not np.isnan(agreed.rms):
-            spread, unit = (
-                window_scatter(estimate.mixture, channels),
-                CHANNEL_UNITS[channels[0]],
-            )
+            spread = window_scatter(estimate.mixture, channels)
+            unit = CHANNEL_UNITS[channels[0]]
             sentences.append(
                 words.scatter_warning(name, agreed.chi2, agreed.dof, spread, unit)
             )
     chi2, dof = closure_chi2(estimate)
     if dof >= thresholds.MIN_TURN_DOF:
-        sentences.append(
-            words.scatter_warning(
-                "turns", chi2, dof, closure_scatter(estimate.mixture), "rad"
-            )
-        )
+        spread = closure_scatter(estimate.mixture)
+        sentences.append(words.scatter_warning("turns", chi2, dof, spread, "rad"))
     return sentences
 
 

@@ -86,12 +86,9 @@ def effects_warning(
     """
     if sure < thresholds.NAMED:
         return ""
+    likely = {i: p for i, p in causes.items() if p >= thresholds.MENTIONED}
     listed = join_words(
-        [
-            f"{IN_WORDS.get(i, i)} (probability {p:.2f})"
-            for i, p in causes.items()
-            if p >= thresholds.MENTIONED
-        ]
+        [f"{IN_WORDS.get(i, i)} (probability {p:.2f})" for i, p in likely.items()]
     )
     if not names:
         return f"the recording shows {listed}; fieldcal diagnose says what to do"

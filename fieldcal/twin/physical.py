@@ -26,7 +26,7 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.model.search.estimated_state import state_at_estimate
+from fieldcal.model.search.gauss_newton import state_at_estimate
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.physics.experience import Experience

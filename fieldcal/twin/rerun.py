@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
+from fieldcal.diagnosis.findings.agreement import rms_over_parts
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from session_folders import places, recorded, write_session
 
-from fieldcal.diagnosis.explain import build_fit, fit_calibration_only
+from fieldcal.diagnosis.fit import build_fit, fit_calibration_only
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile
@@ -34,9 +34,7 @@ def test_the_simulation_is_compared_with_a_calibration_that_a_device_can_have(
     block = recorded(LOUD, held, seed=seed)
     session = Session.open(write_session(tmp_path / "alike", block, held))
     found = prepare_recording(session.block, session.about)
-    fitted = fit_calibration_only(
-        build_fit(found.source, found.rows, found), found.rows
-    )
+    fitted = fit_calibration_only(build_fit(found), found.rows)
     d = fitted.dictionary
     bias = fitted.set.state.columns == d.bias + 1
     assert np.abs(fitted.estimate[d.bias + 1]) < 3 * 2.8

@@ -53,7 +53,7 @@ def explained(change: Array, nominal: float = 1.0) -> Explanation:
     parts: dict[str, Any] = {
         "best": SimpleNamespace(set=fitted),
         "inferred": SimpleNamespace(fit=SimpleNamespace(nominal=state)),
-        "prepared": SimpleNamespace(source=SimpleNamespace(about=about)),
+        "source": SimpleNamespace(about=about),
     }
     return cast(Explanation, SimpleNamespace(**parts))
 

@@ -9,7 +9,7 @@ import pytest
 from observed import BIAS, SCALE, G, observe, outputs
 
 from fieldcal.core.positions import Position
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.state import State
 from fieldcal.solve import agreement, solve
@@ -17,7 +17,6 @@ from fieldcal.solve.agreement import LargestResidual, TriadFit
 from fieldcal.solve.base_rate import with_base_rate
 from fieldcal.solve.estimation import ParameterEstimate, estimate_parameters
 from fieldcal.solve.observation_rows import rows_of_observations
-from fieldcal.solve.observations import Index
 from fieldcal.solve.parameter_set import ParameterSetOptions
 
 SIZE = np.array([1e-3, 2e-3, 0.7e-3])
@@ -26,7 +25,7 @@ PLACES = tuple(
     for a, b in [(0, 0), (45, 5), (45, -40), (-45, 5), (120, 60), (0, 5), (-100, -40)]
 )
 HAND = Position("by hand")
-WIDE = priors.FREE_SIZE * np.array([priors.BIAS_ACC] * 3 + [priors.SCALE] * 3)
+WIDE = priors.FREE_SIZE * np.append(priors.BIAS[:3], [priors.SCALE] * 3)
 STEP = 1e-4
 
 

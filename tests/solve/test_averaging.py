@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -9,8 +10,9 @@ import numpy as np
 import pytest
 
 from fieldcal.calibration.lot_prior import LotPrior
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
+from fieldcal.model.causes.cause import Group
 from fieldcal.solve import averaging
 from fieldcal.solve.averaging import (
     AllParameters,
@@ -29,17 +31,10 @@ def made_set(turned: bool = False, prior: float = 10.0) -> Any:
     at_end = np.zeros((2, 6, WIDTH))
     at_end[0, 0, 5], at_end[1, 5, 5], at_end[1, 0, 5] = 7.0, 0.5, 99.0
 
-    def columns_for(name: str) -> Index:
-        return np.array([AT[name]])
-
-    def prior_sigma(size: float) -> Array:
-        return np.full(WIDTH, size * prior)
-
-    group = SimpleNamespace(
-        columns=np.arange(WIDTH), fixed_size=2.0, prior_sigma=prior_sigma
-    )
+    wide = np.full(WIDTH, prior)
+    group = Group("bias", "acc", np.arange(WIDTH), wide, fixed_size=2.0)
     return SimpleNamespace(
-        names=NAMES, columns_for=columns_for, width=WIDTH, groups=[group],
+        names=NAMES, column_by_name=AT, width=WIDTH, groups=[group],
         bias_scale_at_end=at_end, options=SimpleNamespace(turned=turned),
     )  # fmt: skip
 
@@ -108,7 +103,7 @@ def test_a_variance_that_rows_hardly_reduce_is_not_determined() -> None:
         names = select_determined(there, sigmas(sigma, 1e-3, 1e-3))[0]
         assert ("acc_bias.x" in names) == known
     free = made_set(prior=0.1)
-    free.groups[0].fixed_size = None
+    free.groups[0] = replace(free.groups[0], fixed_size=None)
     limit /= 2
     for sigma, known in ((0.99 * limit, True), (1.01 * limit, False)):
         names = select_determined(free, sigmas(sigma, 1e-3, 1e-3))[0]

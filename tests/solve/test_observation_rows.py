@@ -13,10 +13,10 @@ from fieldcal.calibration import Nominal
 from fieldcal.core.base_motion import BaseMotion
 from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.core.samples import Array
+from fieldcal.model.rows.turntable import unknown_earth_rate
 from fieldcal.solve.observation_rows import (
     mean_variances,
     rows_of_observations,
-    unknown_earth_rate,
     with_window_variances,
     without_angles,
 )

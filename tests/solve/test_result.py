@@ -65,7 +65,7 @@ def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
         "shift_sigmas": np.zeros(0),
         "valid_at_s": None,
     }
-    vars(none).update(carried | {"values": np.zeros(0), "covariance": np.zeros((0, 0))})
+    vars(none).update(carried | {"values": np.zeros(0), "sigma": np.zeros(0)})
     with pytest.raises(NotObservable) as error:
         result.build_calibration(
             "joint", observed(TWO_POSITIONS, False), SolveOptions(), none, ["a note"]
@@ -77,7 +77,7 @@ def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
 
 def test_wrong_angles_harm_where_they_move_more_than_the_margin() -> None:
     found = estimated(names=("acc_bias.x", "acc_bias.y"))
-    vars(found)["covariance"] = np.diag([4.0, 1.0])
+    vars(found)["sigma"] = np.array([2.0, 1.0])
     for moves, harms in (((9.9, -4.9), False), ((10.1, 0.0), True), ((0, -5.1), True)):
         both = dict(zip(found.names, moves, strict=True))
         assert result._is_harmful(WrongAngles(0, None, 1, 0.5, both), found) == harms
@@ -176,7 +176,8 @@ def whole(**known: Any) -> ParameterEstimate:
         "contradicted_turns": (), "sets": None,
         "acc": fit(rejects_model=False), "gyr": fit(chi2=5.0, rejects_model=False),
     }  # fmt: skip
-    found = estimated(**(nothing | known))
+    told = nothing | known
+    found = estimated(**told, sigma=np.sqrt(np.diag(told["covariance"])))
     found.parameter_set.omitted_cross_coupling = None
     cast(Any, found.parameter_set).earth = -1
     return found

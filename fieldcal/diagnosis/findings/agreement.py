@@ -1,4 +1,7 @@
-"""Residuals of one model: of its fit, and of its predictions of held-out positions."""
+"""Residuals of one model: of its fit, and of its predictions of held-out positions.
+
+They are averaged over parts of the windows, to reduce their noise.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,55 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.rows.averages import Rows
+
+PART_ENDS = (0.0, 0.1, 0.25, 0.5, 1.0)
+"""Ends of the parts of a window over which residuals are averaged."""
+
+
+def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, Index]:
+    """Means over parts of the windows.
+
+    Returns
+    -------
+    mean : (m, 6) weighted mean residuals; nan where there is none
+    sd : (m, 6) their standard deviation from white noise
+    position : (m,)
+
+    """
+    means, sds, position = [], [], []
+    for p in np.unique(rows.x.position):
+        at = np.flatnonzero(rows.x.position == p)
+        cuts = np.unique(np.round(np.array(PART_ENDS) * len(at)).astype(int))
+        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+            part = at[a:b]
+            use = np.isfinite(residual[part]) & rows.used[part]
+            weight = np.where(use, 1 / np.where(use, rows.sd[part], 1.0) ** 2, 0.0)
+            total = weight.sum(axis=0)
+            information = np.where(total > 0, total, np.nan)
+            means.append(
+                (weight * np.nan_to_num(residual[part])).sum(axis=0) / information
+            )
+            sds.append(np.hypot(1 / np.sqrt(information), rows.window_error[part[0]]))
+            position.append(p)
+    return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
+
+
+def root_mean_square(values: Array) -> float:
+    """Root mean square of the known of some values (n,); nan if none is known."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+def rms_over_parts(rows: Rows, residual: Array) -> Array:
+    """Root mean square over the parts of windows, (6,); nan where there is none."""
+    mean, _, _ = part_means(rows, residual)
+    count = np.isfinite(mean).sum(axis=0)
+    squares = np.nansum(mean**2, axis=0)
+    return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))
+
 
 UNITS = ("m/s^2", "rad/s")
 
@@ -55,14 +103,10 @@ class ModelResiduals:
         """Quality in the unit of one triad: 0 accelerometers, 1 gyroscopes."""
         part = slice(3 * triad, 3 * triad + 3)
         held_out = np.sqrt(self.held_out_rms**2 + self.lines_predicted)
-        by_channel = {
-            n: float(v)
-            for n, v in zip(CHANNELS, held_out, strict=True)
-            if np.isfinite(v)
-        }
+        pairs = zip(CHANNELS, held_out.tolist(), strict=True)
         return Quality(
             rms=root_mean_square(self.rms_with_lines[part]),
             chi2_per_dof=self.chi2_per_dof,
             held_out_rms=root_mean_square(held_out[part]),
-            by_channel=by_channel,
+            held_out_by_channel={n: v for n, v in pairs if np.isfinite(v)},
         )

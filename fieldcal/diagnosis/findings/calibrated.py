@@ -11,8 +11,10 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import CalibrationGroup, Quantity
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.model_average import average_of_columns
-from fieldcal.model.posterior.size_average import average_over_sizes
+from fieldcal.model.posterior.model_average import (
+    average_of_columns,
+    average_over_sizes,
+)
 from fieldcal.model.state import State
 
 GYRO_SCALE = "gyro_scale"
@@ -28,7 +30,7 @@ GROUP_UNITS = {
 
 def calibration_groups(explanation: Explanation) -> dict[str, CalibrationGroup]:
     """Groups of the calibration that the recording determines, in output units."""
-    about = explanation.prepared.source.about
+    about = explanation.source.about
     nominal, gauge = about.nominal, about.gauge
     found = averaged_calibration(explanation)
     out = {}
@@ -69,7 +71,7 @@ def impossible_turn_scales(explanation: Explanation) -> dict[str, str]:
     is not what happened.
     """
     found = turn_scale_factors(explanation.best.set, explanation.inferred.fit.nominal)
-    about = explanation.prepared.source.about.nominal
+    about = explanation.source.about.nominal
     nominal = Nominal(**{k: tuple(v.tolist()) for k, v in about.items()})
     return {
         name: sentence
@@ -121,11 +123,9 @@ def _values_by_name(
     d, nominal = explanation.dictionary, explanation.inferred.fit.nominal
     sigma, out = np.sqrt(np.diag(covariance)), {}
     for column, change, error in zip(at, mean, sigma, strict=True):
-        first, base, kind = (
-            (d.bias, nominal.bias, "bias")
-            if column < d.bias + 6
-            else (d.scale, nominal.scale, "scale")
-        )
+        first, base, kind = d.bias, nominal.bias, "bias"
+        if column >= d.bias + 6:
+            first, base, kind = d.scale, nominal.scale, "scale"
         c = int(column - first)
         name = f"{'acc' if c < 3 else 'gyr'}_{kind}.{'xyz'[c % 3]}"
         size = float(abs(explanation.state.scale[c])) or 1.0
@@ -134,21 +134,13 @@ def _values_by_name(
 
 
 def calibration_changes(explanation: Explanation, less: Set) -> dict[str, Quantity]:
-    """Change of the calibration when a cause is taken into account.
+    """Change of the calibration when a cause is taken into account, by full name.
 
-    Parameters
-    ----------
-    explanation : with the cause
-    less : the best set without it
-
-    Returns
-    -------
-    by full name: value with the cause less value without it, with the sigma of the
-    averaged calibration, in the unit of the outputs; parameters that either set does
-    not determine are absent
-
+    That is the value with the cause less that of `less`, the best set without it, with
+    the sigma of the averaged calibration, in the unit of the outputs. Parameters that
+    either set does not determine are absent.
     """
-    gauge = explanation.prepared.source.about.gauge
+    gauge = explanation.source.about.gauge
     now, before = (
         calibration_of_set(explanation, s) for s in (explanation.best.set, less)
     )

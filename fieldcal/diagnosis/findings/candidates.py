@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
+from fieldcal.diagnosis.findings.agreement import rms_over_parts
 from fieldcal.diagnosis.result import Candidate, FoundEffect
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import held_out_residuals
-from fieldcal.model.search.offer import Offer
+from fieldcal.model.search.offers import Offer
 from fieldcal.physics.effect import Scatter
 
 LARGEST_LOG_ODDS = 40.0
@@ -46,27 +46,18 @@ def tried_candidates(
         delta = 2 * _evidence_rise(offer, nothing) if offer else 0.0
         width = len(offer.member[1].columns) if offer else 0
         accepted = taken.get(id_)
-        why = (
-            ""
-            if accepted
-            else _reason_rejected(id_, explanation, offer, beside.get(id_))
-        )
-        gain = accepted.evidence.get("held_out_gain", np.nan) if accepted else np.nan
+        why, gain = "", np.nan
+        if accepted:
+            gain = accepted.evidence.get("held_out_gain", np.nan)
+        else:
+            why = _reason_rejected(id_, explanation, offer, beside.get(id_))
         if accepted is None and offer is not None and id_ in followed:
             gain = _held_out_gain_alone(explanation, offers.accept(nothing, offer))
             if gain < 0:
                 why = f"what it was not fitted to it predicts worse; {why}"
-        out.append(
-            Candidate(
-                id_,
-                delta,
-                delta - width * float(np.log(rows)),
-                gain,
-                posterior.probability([id_]),
-                accepted is not None,
-                why,
-            )
-        )
+        bic = delta - width * float(np.log(rows))
+        sure, chosen = posterior.probability([id_]), accepted is not None
+        out.append(Candidate(id_, delta, bic, gain, sure, chosen, why))
     return tuple(sorted(out, key=lambda c: -c.delta_chi2))
 
 

@@ -30,10 +30,8 @@ def covariate_functions(name: str, x: Experience, channel: int) -> Mapping[str, 
         names = [f"f_{a}" for a in "xyz"]
         forces = dict(zip(names, x.f.T, strict=True))
         return {f"{n}^{k}": f**k for n, f in forces.items() for k in (1, 2, 3, 4)}
-    of_alpha, of_beta = (
-        _angle_functions("alpha", x.alpha),
-        _angle_functions("beta", x.beta),
-    )
+    of_alpha = _angle_functions("alpha", x.alpha)
+    of_beta = _angle_functions("beta", x.beta)
     if name == "joints":
         return {f"{a}*{b}": of_alpha[a] * of_beta[b] for a in of_alpha for b in of_beta}
     return of_alpha if name == "alpha" else of_beta

@@ -13,8 +13,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.agreement import ModelResiduals
-from fieldcal.diagnosis.findings.stretch_means import part_means
+from fieldcal.diagnosis.findings.agreement import ModelResiduals, part_means
 from fieldcal.diagnosis.result import Curve, Mismatch
 from fieldcal.model.rows.averages import Rows
 
@@ -26,7 +25,7 @@ def residual_curves(
     then: ModelResiduals,
 ) -> Iterator[Curve]:
     """One curve for each channel and covariate of the mismatches in the windows."""
-    source = explanation.prepared.source
+    source = explanation.source
     start = source.thermometer.start_c
     done = set()
     for m in mismatch:

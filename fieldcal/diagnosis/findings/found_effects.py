@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.agreement import ModelResiduals
+from fieldcal.diagnosis.findings.agreement import (
+    ModelResiduals,
+    rms_over_parts,
+    root_mean_square,
+)
 from fieldcal.diagnosis.findings.calibrated import calibration_changes
 from fieldcal.diagnosis.findings.instant import estimate_instant
-from fieldcal.diagnosis.findings.random_sizes import (
-    random_sizes,
-)
-from fieldcal.diagnosis.findings.stretch_means import rms_over_parts, root_mean_square
+from fieldcal.diagnosis.findings.random_sizes import random_sizes
 from fieldcal.diagnosis.result import FoundEffect, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import (
-    Member,
-)
+from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.common_axes import in_common_axes, parameter_rows
 from fieldcal.model.posterior.held_out import held_out_turn_residuals, turn_residual
 from fieldcal.model.posterior.probabilities import ProbableCause
@@ -59,7 +58,7 @@ def remove_cause(explanation: Explanation, standing: ProbableCause) -> CauseRemo
     """Remove a cause, and calculate what its columns had explained."""
     best = explanation.best
     less = explanation.posterior.without(standing.name)
-    reduced = FittedSet(best.rows, best.dictionary, best.linear, best.values, less)
+    reduced = replace(best, set=less)
     residual = reduced.residual(reduced.deterministic_estimate)
     now = best.squares_of(best.residual(best.deterministic_estimate))
     turned = _squares_of_turns(explanation, reduced) - _squares_of_turns(
@@ -98,13 +97,9 @@ def effect_of_cause(
     }
     known = tuple(n for n in standing.aliases if n in catalogue())
     return FoundEffect(
-        standing.name,
-        parameter_estimates(explanation, standing),
-        known,
-        evidence,
-        standing.probability,
-        calibration_changes(explanation, lost.set),
-    )
+        standing.name, parameter_estimates(explanation, standing), known, evidence,
+        standing.probability, calibration_changes(explanation, lost.set),
+    )  # fmt: skip
 
 
 def _score_at_instability(less: Set, best: Set) -> float:
@@ -175,7 +170,7 @@ def merge_turned_parameters(
     effect, out = group.effect, dict(own)
     if effect is None:
         return out
-    names = [effect.params[j].name for j in group.params]
+    names = group.names
     for gone, kept in effect.turned_into.items():
         if kept not in names and gone in out:
             out[kept] = out.pop(gone)
@@ -257,8 +252,8 @@ def held_out_rms_gain(
 ) -> float:
     """Part of the held-out rms that is removed, in the channel with the most effect."""
     best, turned = explanation.best, explanation.inferred.turn_rows
-    reduced = FittedSet(best.rows, best.dictionary, best.linear, best.values, lost.set)
     if shows_mainly_in_turns(lost):
+        reduced = replace(best, set=lost.set)
         without = root_mean_square(held_out_turn_residuals(reduced, turned))
         return float(1 - root_mean_square(explanation.turns_held_out) / without)
     ahead = rms_over_parts(best.rows, explanation.held_out.residual([lost.set]))

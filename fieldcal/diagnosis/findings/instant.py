@@ -15,9 +15,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
@@ -30,7 +29,7 @@ def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, f
     """Instant of a change, s of device time, and its standard uncertainty."""
     _, group = member
     (at,) = group.shape.values()
-    rows, block = explanation.rows, explanation.prepared.source.block
+    rows, block = explanation.rows, explanation.source.block
     known = _fitted_changes(explanation, member)
     scale, before = explanation.state.scale, dict.fromkeys(group.shape, -np.inf)
     jump = _change_of_outputs(rows.x, scale, known)
@@ -41,7 +40,7 @@ def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, f
     part = slice(*np.searchsorted(block.t, [low, np.nextafter(high, np.inf)]))
     t, six = block.t[part], block.six[part]
     row = np.clip(np.searchsorted(rows.span[:, 1], t), 0, len(rows.x.t) - 1)
-    held = _at_rest(explanation, t)[:, None] & explanation.prepared.source.usable[part]
+    held = _at_rest(explanation, t)[:, None] & explanation.source.usable[part]
     z = np.where(held, six - plain[row], np.nan)
     noise = np.where(rows.noise > 0, rows.noise, np.inf)
     squares, edges = _squares(z, change[row], noise), np.concatenate([t, [high]])
@@ -57,12 +56,7 @@ def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, f
 def _squares(z: Array, change: Array, noise: Array) -> Array:
     """S of changes before each instant and after the last, (n + 1,), less a constant.
 
-    Parameters
-    ----------
-    z : (n, 6) samples less the model without the change; nan where missing
-    change : (n, 6)
-    noise : (6,) or (n, 6) standard deviations
-
+    `z` (n, 6) are samples less the model without the change, nan where missing.
     """
     gained = np.nan_to_num(((z - change) ** 2 - z**2) / noise**2).sum(axis=1)
     return np.concatenate([np.cumsum(gained[::-1])[::-1], [0.0]])
@@ -77,18 +71,16 @@ def _possible_instants(
     instants = np.append(
         np.flatnonzero(squares < squares.min() + thresholds.IN_CHANNEL), near
     )
-    first, last = (
-        max(int(instants.min()) - 1, 0),
-        min(int(instants.max()), len(span) - 1),
-    )
+    first = max(int(instants.min()) - 1, 0)
+    last = min(int(instants.max()), len(span) - 1)
     return float(span[first, 0]), float(span[last, 1])
 
 
-def _at_rest(explanation: Explanation, t: Array) -> NDArray[np.bool_]:
+def _at_rest(explanation: Explanation, t: Array) -> Mask:
     """Whether samples at times t (n,) lie within a row, (n,)."""
     span = explanation.rows.span
     row = np.clip(np.searchsorted(span[:, 1], t), 0, len(span) - 1)
-    inside: NDArray[np.bool_] = (t >= span[row, 0]) & (t <= span[row, 1])
+    inside: Mask = (t >= span[row, 0]) & (t <= span[row, 1])
     return inside
 
 

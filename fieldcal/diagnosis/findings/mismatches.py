@@ -10,16 +10,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.findings.agreement import part_means
 from fieldcal.diagnosis.findings.correlates import covariate_functions
 from fieldcal.diagnosis.findings.found_effects import (
     CauseRemoval,
     shows_mainly_in_turns,
 )
-from fieldcal.diagnosis.findings.stretch_means import part_means
 from fieldcal.diagnosis.findings.unknown_mismatch import single_errors
 from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import catalogue
@@ -70,18 +69,13 @@ def _in_windows(
     start, end = time_span(explanation, at)
     inside = np.isin(position, at)
     return Mismatch(
-        channel=CHANNELS[c],
-        kind=kind,
-        positions=at,
-        from_s=start,
-        to_s=end,
-        covariate=covariate,
-        rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
+        channel=CHANNELS[c], kind=kind, positions=at, from_s=start, to_s=end,
+        covariate=covariate, rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
         sigma=float(np.sqrt(max(lost.squares[c], 0.0))),
-    )
+    )  # fmt: skip
 
 
-def outstanding_positions(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
+def outstanding_positions(z: Array, position: Index) -> tuple[int, ...]:
     """Positions with a significant residual; that of the largest, if there is none."""
     size = np.nan_to_num(np.abs(z))
     out = np.unique(position[size > thresholds.STANDS_OUT])
@@ -94,7 +88,7 @@ def time_span(
     explanation: Explanation, positions: Sequence[int]
 ) -> tuple[float, float]:
     """Device time from the first to the last sample of some positions, s."""
-    source = explanation.prepared.source
+    source = explanation.source
     windows = window_bounds(source.block, source.about)[list(positions)]
     t = source.block.t
     return float(t[windows[:, 0].min()]), float(t[windows[:, 1].max() - 1])
@@ -118,7 +112,7 @@ def _of_turns(
     out = squares > max(thresholds.STANDS_OUT**2, 0.05 * squares.max())
     contributing = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
     places = tuple(sorted({p for t in contributing for p in t.positions}))
-    source = explanation.prepared.source
+    source = explanation.source
     windows = window_bounds(source.block, source.about)
     t = source.block.t
     gaps = [
@@ -226,7 +220,7 @@ def best_correlate(
 
 
 def of_faults(
-    t: Array, windows: NDArray[np.intp], faults: Sequence[tuple[str, Fault]]
+    t: Array, windows: Index, faults: Sequence[tuple[str, Fault]]
 ) -> Iterator[Mismatch]:
     """Mismatches by faults of samples."""
     for name, fault in faults:

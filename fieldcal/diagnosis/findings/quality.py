@@ -12,13 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import (
-    Explanation,
-    build_fit,
-    fit_calibration_only,
-)
-from fieldcal.diagnosis.findings.agreement import ModelResiduals
-from fieldcal.diagnosis.findings.stretch_means import root_mean_square
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.findings.agreement import ModelResiduals, root_mean_square
+from fieldcal.diagnosis.fit import build_fit, fit_calibration_only
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.posterior.held_out import (
@@ -41,13 +37,9 @@ def _model_residuals(
     same = fitted.rows.y.shape == weighed.rows.y.shape
     squares = weighed.squares_of(fitted.residual()) if same else fitted.squares
     return ModelResiduals(
-        fitted.rows,
-        fitted.residual(fitted.deterministic_estimate),
-        ahead,
-        lines,
-        predicted,
-        float(squares.sum()) / max(fitted.dof, 1),
-    )
+        fitted.rows, fitted.residual(fitted.deterministic_estimate), ahead, lines,
+        predicted, float(squares.sum()) / max(fitted.dof, 1),
+    )  # fmt: skip
 
 
 def simulation_residuals(block: Block, explanation: Explanation) -> ModelResiduals:
@@ -105,7 +97,8 @@ def fit_recorded_samples(block: Block, explanation: Explanation) -> FittedSet:
     # rows of the same kind as before: by-hand or not is not decided again
     in_hand = prepared.rows.hand_angle.any()
     rows = rows_of_recording(source) if in_hand else reduce_to_rows(source)
-    return fit_calibration_only(build_fit(source, rows, prepared), rows)
+    fit = build_fit(replace(prepared, source=source, rows=rows))
+    return fit_calibration_only(fit, rows)
 
 
 def most_different_triad(one: ModelResiduals, other: ModelResiduals) -> int:

@@ -62,7 +62,5 @@ def _scattered_columns(d: Dictionary, group: Group) -> Iterator[tuple[Param, Ind
     if not group.params:
         yield from ((one, group.columns) for one in params)
     for c in group.params:
-        yield (
-            params[c],
-            np.intersect1d(group.columns, d.cosine_columns(c, d.wander.modes[c])),
-        )
+        cosines = d.cosine_columns(c, d.wander.modes[c])
+        yield params[c], np.intersect1d(group.columns, cosines)

@@ -59,15 +59,12 @@ def unknown_mismatches(
     pairs = {
         p: pair for pair in exchanged_positions(explanation, standing) for p in pair
     }
-    return [
-        UnknownMismatch(
-            standing.name,
-            m,
-            turned.get(m.positions, ()),
-            pairs.get(m.positions[0], ()) if m.positions in turned else (),
-        )
-        for m in found
-    ]
+    out = []
+    for m in found:
+        angles = turned.get(m.positions, ())
+        pair = pairs.get(m.positions[0], ()) if m.positions in turned else ()
+        out.append(UnknownMismatch(standing.name, m, angles, pair))
+    return out
 
 
 def angle_errors(

@@ -10,16 +10,15 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.positions import alpha_beta_angles, gamma_angles
-from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.core.samples import CHANNELS, Array, Block, Index, Mask
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.orientation import gyro_readings
+from fieldcal.model.rows.reduce import median_sigma
 from fieldcal.model.rows.vibration import quiet_window_noise
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.physics.effect import Chain
@@ -45,7 +44,7 @@ class CheckedRecording:
     """
 
     block: Block
-    usable: NDArray[np.bool_]
+    usable: Mask
     faults: tuple[tuple[str, Fault], ...]
     noise: Array
     unused: tuple[str, ...] = ()
@@ -104,10 +103,7 @@ def check_chain(block: Block, about: Description) -> CheckedRecording:
 
 
 def _correct(
-    block: Block,
-    usable: NDArray[np.bool_],
-    about: Description,
-    faults: list[tuple[str, Fault]],
+    block: Block, usable: Mask, about: Description, faults: list[tuple[str, Fault]]
 ) -> tuple[Block, CheckedSamples]:
     """Correct the faults that can be undone; they are appended to `faults`."""
     samples = samples_to_check(block, usable, about)
@@ -164,9 +160,7 @@ def _mend_samples(block: Block, fault: Fault) -> Array:
     return six
 
 
-def _mark_unusable(
-    name: str, fault: Fault, usable: NDArray[np.bool_], windows: NDArray[np.intp]
-) -> None:
+def _mark_unusable(name: str, fault: Fault, usable: Mask, windows: Index) -> None:
     if name == "bump":
         usable[fault.rows] = False
         return
@@ -189,11 +183,8 @@ def _off_rails(faults: list[Fault], samples: CheckedSamples) -> list[Fault]:
     rails = {f.channel: f.rows for f in _find("saturation", samples)}
     clipped = [bool(np.isin(f.rows, rails.get(f.channel, ())).all()) for f in faults]
     often = Counter(f.channel for f, c in zip(faults, clipped, strict=True) if c)
-    return [
-        f
-        for f, c in zip(faults, clipped, strict=True)
-        if not (c and often[f.channel] > 1)
-    ]
+    pairs = zip(faults, clipped, strict=True)
+    return [f for f, c in pairs if not (c and often[f.channel] > 1)]
 
 
 def _is_stuck(fault: Fault, faults: list[tuple[str, Fault]]) -> bool:
@@ -214,9 +205,7 @@ def _without_rail_runs(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault
     ]
 
 
-def samples_to_check(
-    block: Block, usable: NDArray[np.bool_], about: Description
-) -> CheckedSamples:
+def samples_to_check(block: Block, usable: Mask, about: Description) -> CheckedSamples:
     """Samples and facts that the checks are given."""
     windows, rate = window_bounds(block, about), sampling_rate(block)
     block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
@@ -246,14 +235,9 @@ def samples_to_check(
     )
     limits = [about.limits.get(k, np.nan) for k in ("acceleration", "angular_rate")]
     return CheckedSamples(
-        block=block,
-        windows=windows,
-        x=x,
+        block=block, windows=windows, x=x,
         scale=np.concatenate([about.nominal["acc_scale"], about.nominal["gyr_scale"]]),
         bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
-        noise=noise.white,
-        quick=noise.quick,
-        steps=grids_of(block),
-        limits=np.array(limits),
-        rate_hz=about.rate_hz or np.nan,
-    )
+        noise=noise.white, quick=noise.quick, steps=grids_of(block),
+        limits=np.array(limits), rate_hz=about.rate_hz or np.nan,
+    )  # fmt: skip

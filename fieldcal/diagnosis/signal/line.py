@@ -20,6 +20,7 @@ from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Line
+from fieldcal.physics.experience import Experience
 
 MIN_HELD_OUT_WINDOWS, STRETCHES_PER_WINDOW, MAX_FOLDS = 3, 5, 12
 """Number of windows below which stretches of them are held out in place of windows;
@@ -59,6 +60,10 @@ class SpectralLine:
     chi2: float
     gain: float
 
+    def amplitudes(self, x: Experience) -> Complex:
+        """Its complex amplitudes in windows of these orientations, (w, 6)."""
+        return self.effect.response(x, self.hz) @ self.causes
+
     @property
     def clear_channels(self) -> list[int]:
         """Indices of the channels in which it is significant."""
@@ -91,14 +96,14 @@ class LineRemainder:
 
 def tune_line(pieces: WindowSamples, effect: Line, moments: Moments) -> SpectralLine:
     """Fit an effect at the frequency near that of the moments that explains most."""
-    shortest = min(PERIODOGRAM_SAMPLES, min(map(len, pieces.samples))) / pieces.rate
+    shortest = pieces.shortest_samples(PERIODOGRAM_SAMPLES) / pieces.rate
     step = 0.2 / max(float(np.ptp(moments.middle)), shortest)
     offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
     tone = _line_at_best_frequency(pieces, effect, moments, offsets, step, 3)
     if not pieces.usable or tone.hz * shortest > SLOPE_PERIODS:
         return tone
-    amplitude = effect.response(pieces.x, tone.hz) @ tone.causes
-    again = moments_of(pieces.with_whole_line(tone.hz, amplitude), tone.hz)
+    whole = pieces.with_whole_line(tone.hz, tone.amplitudes(pieces.x))
+    again = moments_of(whole, tone.hz)
     return _line_at_best_frequency(
         pieces, effect, again, np.linspace(-step, step, 11), step / 5, 2
     )
@@ -130,7 +135,7 @@ def line_remainder(pieces: WindowSamples, tone: SpectralLine) -> LineRemainder:
     groups = np.arange(len(moments.counts))
     fold = groups % (MAX_FOLDS if many else STRETCHES_PER_WINDOW)
     measured = moments.amplitudes(np.zeros(1))[0]
-    fitted = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[moments.window]
+    fitted = tone.amplitudes(pieces.x)[moments.window]
     ahead = measured.copy()
     span = max(float(np.ptp(moments.middle)), 1 / tone.hz)
     for i in np.unique(fold):
@@ -141,7 +146,7 @@ def line_remainder(pieces: WindowSamples, tone: SpectralLine) -> LineRemainder:
         )
         # a wave at a slightly different frequency rotates against that at tone.hz
         left = moments.select(fold == i)
-        predicted = (tone.effect.response(pieces.x, near.hz) @ near.causes)[left.window]
+        predicted = near.amplitudes(pieces.x)[left.window]
         ahead[fold == i] -= predicted * _mean_rotation(left, near.hz - tone.hz)
     noise = np.where(np.nan_to_num(pieces.noise) > 0, pieces.noise, np.inf)
     fallen = np.abs(measured) ** 2 - np.abs(ahead) ** 2
@@ -255,16 +260,9 @@ def _line_at(
     spread = float(np.concatenate(pieces.times).std())
     sigmas["hz"] = float(1 / (2 * np.pi * spread * np.sqrt(max(chi2, 1.0))))
     return SpectralLine(
-        effect,
-        float(hz),
-        causes,
-        values,
-        sigmas,
-        tuple(clear),
-        amplitude,
-        chi2,
+        effect, float(hz), causes, values, sigmas, tuple(clear), amplitude, chi2,
         chi2 / 2 - float(np.log1p(strength / 2).sum()),
-    )
+    )  # fmt: skip
 
 
 def _named_amplitudes(

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 
@@ -42,8 +41,8 @@ class Moments:
     near: float
     sums: Complex
     middle: Array
-    bound: NDArray[np.intp]
-    window: NDArray[np.intp]
+    bound: Index
+    window: Index
     counts: Array
 
     def amplitudes(self, offset: Array) -> Complex:
@@ -53,18 +52,15 @@ class Moments:
         amplitude: Complex = 2 / self.counts[:, None] * np.stack(parts, axis=1)
         return amplitude
 
-    def select(self, groups: NDArray[np.bool_]) -> Moments:
+    def select(self, groups: Mask) -> Moments:
         """The moments of some groups only, `groups` (g,)."""
         size = np.diff(self.bound)
         parts = np.repeat(groups, size)
         return Moments(
-            self.near,
-            self.sums[parts],
-            self.middle[parts],
-            np.append(0, np.cumsum(size[groups])),
-            self.window[groups],
+            self.near, self.sums[parts], self.middle[parts],
+            np.append(0, np.cumsum(size[groups])), self.window[groups],
             self.counts[groups],
-        )
+        )  # fmt: skip
 
 
 def moments_of(pieces: WindowSamples, near: float, stretches: int = 1) -> Moments:
@@ -86,13 +82,9 @@ def moments_of(pieces: WindowSamples, near: float, stretches: int = 1) -> Moment
             counts.append(float(last - first))
     window = np.repeat(np.arange(len(pieces.samples)), stretches)
     return Moments(
-        near,
-        np.array(sums),
-        np.array(middle),
-        np.array(bound),
-        window,
+        near, np.array(sums), np.array(middle), np.array(bound), window,
         np.array(counts),
-    )
+    )  # fmt: skip
 
 
 def _part_bounds(first: int, last: int, parts: int) -> list[int]:

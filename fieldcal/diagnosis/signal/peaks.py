@@ -13,12 +13,10 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
+from fieldcal.diagnosis.signal.noise_level import FLOOR_NEIGHBOURS, FURTHEST_NEIGHBOUR
 from fieldcal.diagnosis.signal.periodogram import (
-    FLOOR_NEIGHBOURS,
-    FURTHEST_NEIGHBOUR,
     LINE_DISTANCE_CYCLES,
     PERIODOGRAM_SAMPLES,
     Spectrum,
@@ -66,7 +64,7 @@ def highest_peak(
     Spectra of one phase throughout come first: tremor is louder, but is no line. Peaks
     close to those in `taken` are ignored.
     """
-    shortest = min(PERIODOGRAM_SAMPLES, min(map(len, pieces.samples))) / pieces.rate
+    shortest = pieces.shortest_samples(PERIODOGRAM_SAMPLES) / pieces.rate
     low, reach = max(0.05, MIN_CYCLES / shortest), LINE_DISTANCE_CYCLES / shortest
     one_phase = [s for s in spectra if s.count == 1]
     peak = _significant(one_phase, low, reach, taken)
@@ -144,7 +142,7 @@ def _highest_in_spectrum(
     return best
 
 
-def _away_from(hz: Array, peaks: Sequence[Peak], reach: float) -> NDArray[np.bool_]:
+def _away_from(hz: Array, peaks: Sequence[Peak], reach: float) -> Mask:
     """Frequencies that are close to none of some peaks, (m,)."""
     free = np.ones(len(hz), dtype=bool)
     for peak in peaks:

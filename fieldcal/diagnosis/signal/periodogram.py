@@ -21,32 +21,23 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
+from fieldcal.diagnosis.signal.noise_level import (
+    FURTHEST_NEIGHBOUR,
+    NEAREST_NEIGHBOUR,
+    noise_level,
+)
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
-from fieldcal.physics.recording import medians
 
 PERIODOGRAM_SAMPLES = 32_768
 """Samples of one periodogram."""
-
-FLOOR_NEIGHBOURS = 40
-"""Neighbours that give the floor, to either side."""
-
-NEAREST_NEIGHBOUR, FURTHEST_NEIGHBOUR = 5, 12
-"""Nearest and furthest neighbours beyond the taper's reach; they give the slope."""
 
 LEVEL_PERIODOGRAMS = 200
 """Periodograms whose mean gives the level of noise, to 7 %."""
 
 LEVEL_SIGMAS = 3.0
 """Standard deviations above the level of noise from which (1) replaces it."""
-
-STEEP_RATIO = 4.0
-"""Multiple of the floor above which these neighbours replace it."""
-
-SLOPE_POWER_SHARE = 0.3
-"""Part of the power at a frequency that is below it on a slope; beside a line, less."""
 
 SHORT_STEP, SHORT_STEP_SHARE = 0.5, 0.01
 """Time step, in sampling periods, below which a step cannot be the device's own, and
@@ -96,23 +87,12 @@ class Spectrum:
         """Channels that are searched, ascending."""
         return sorted({c for group in self.channel_groups for c in group})
 
-    def power_over_noise(self, channel: int, band: NDArray[np.bool_]) -> Array:
+    def power_over_noise(self, channel: int, band: Mask) -> Array:
         """Power in a band over that of noise; Gamma(count) if there is noise only."""
         power = self.power[channel, band]
         known = None if self.known_level is None else self.known_level[channel, band]
         out: Array = power / noise_level(power, self.count, known) * self.count
         return out
-
-
-def noise_level(power: Array, count: int, known: Array | None = None) -> Array:
-    """Mean power of noise at each frequency, (m,), of the sum of some periodograms.
-
-    `known` (m,) is its level away from slopes; otherwise a running median gives it.
-    """
-    if known is None:
-        # median of Gamma(W) over its mean, by Wilson and Hilferty
-        known = _median_floor(power) / (1 - 1 / (9 * count)) ** 3
-    return _floor_on_slope(power, known)
 
 
 def noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
@@ -147,11 +127,8 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
         frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
-    triads = [
-        channels
-        for channels in CHANNEL_GROUPS
-        if set(channels) <= set(windows.channels)
-    ]
+    measured = set(windows.channels)
+    triads = [channels for channels in CHANNEL_GROUPS if measured.issuperset(channels)]
     # electronics may disturb one output alone, motion of the base disturbs a triad
     groups = [(*windows.channel_groups, *triads), tuple(triads)]
     variance = _neighbour_variance(windows, pieces)
@@ -189,7 +166,7 @@ def _neighbour_variance(windows: Spectrum, pieces: WindowSamples) -> Array:
     They lie beyond the reach of a line: that of the taper of the shortest window.
     """
     count, size = windows.count, windows.power.shape[1]
-    cycle = pieces.rate / min(PERIODOGRAM_SAMPLES, min(map(len, pieces.samples)))
+    cycle = pieces.rate / pieces.shortest_samples(PERIODOGRAM_SAMPLES)
     close = max(
         NEAREST_NEIGHBOUR, math.ceil(LINE_DISTANCE_CYCLES * cycle / windows.hz[1])
     )
@@ -281,50 +258,4 @@ def _in_bursts(t: Array, rate: float) -> bool:
 
 
 def _squared_magnitude(spectrum: Complex) -> Array:
-    square: Array = spectrum.real**2 + spectrum.imag**2
-    return square
-
-
-def _median_floor(power: Array) -> Array:
-    """Running median (m,) of the power, interpolated between stretches."""
-    parts = max(1, len(power) // (2 * FLOOR_NEIGHBOURS))
-    each = len(power) // parts
-    level = medians(power[: parts * each].reshape(parts, each))
-    middle = (np.arange(parts) + 0.5) * each
-    floor: Array = np.interp(np.arange(len(power)), middle, level)
-    return np.maximum(floor, 1e-300)
-
-
-def _floor_on_slope(power: Array, floor: Array) -> Array:
-    """The floor, raised to the power close by where that is far above it.
-
-    Drift and settling have more power at lower frequencies. A line must stand out of
-    that slope, too.
-    """
-    n = len(power)
-    # sums up to and including each; beyond the ends there is nothing to add
-    totals = np.pad(
-        np.cumsum(power), (FURTHEST_NEIGHBOUR + 1, FURTHEST_NEIGHBOUR + 1), "edge"
-    )
-    totals[: FURTHEST_NEIGHBOUR + 1] = 0.0
-    counts = np.pad(
-        np.arange(n + 1), (FURTHEST_NEIGHBOUR, FURTHEST_NEIGHBOUR + 1), "edge"
-    )
-    sides = []
-    for low, high in (
-        (-FURTHEST_NEIGHBOUR, -NEAREST_NEIGHBOUR),
-        (NEAREST_NEIGHBOUR + 1, FURTHEST_NEIGHBOUR + 1),
-    ):
-        first, last = FURTHEST_NEIGHBOUR + low, FURTHEST_NEIGHBOUR + high
-        count = counts[last : last + n] - counts[first : first + n]
-        mean = (totals[last : last + n] - totals[first : first + n]) / np.maximum(
-            count, 1
-        )
-        sides.append(np.where(count > 0, mean, np.inf))
-    below, above = sides
-    # at either end of the spectrum only one side has neighbours
-    beside = np.where(np.isfinite(above), np.maximum(below, above), below)
-    beside = np.where(np.isfinite(below), beside, above)
-    falls = (beside > STEEP_RATIO * floor) & (below > SLOPE_POWER_SHARE * power)
-    level: Array = np.where(falls, np.minimum(beside, power), floor)
-    return level
+    return spectrum.real**2 + spectrum.imag**2

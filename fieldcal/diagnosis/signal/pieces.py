@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.change_points import clear_jumps
@@ -48,8 +48,12 @@ class WindowSamples:
     times: tuple[Array, ...]
     noise: Array
     rate: float
-    usable: tuple[NDArray[np.bool_], ...] = ()
+    usable: tuple[Mask, ...] = ()
     cuts: Array = field(default_factory=lambda: np.zeros(0))
+
+    def shortest_samples(self, most: int) -> int:
+        """Number of samples of the shortest window, or `most` if that is less."""
+        return min(most, *map(len, self.samples))
 
     def with_whole_line(self, hz: float, amplitude: Complex) -> WindowSamples:
         """Restore the part of a line that means and slopes have removed.
@@ -102,20 +106,14 @@ def experience_in_windows(
     rows: Rows, held: Sequence[tuple[int, int, int]]
 ) -> Experience:
     """Orientation and forces in the windows of `long_windows`."""
-    x, row_numbers = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
+    x, at = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
     return Experience.at_rest(
-        x.alpha[row_numbers],
-        x.beta[row_numbers],
-        x.gravity,
-        f=x.f[row_numbers],
-        mounting=x.mounting,
-        gamma=x.gamma[row_numbers],
-    )
+        x.alpha[at], x.beta[at], x.gravity, f=x.f[at], mounting=x.mounting,
+        gamma=x.gamma[at],
+    )  # fmt: skip
 
 
-def _detrended(
-    t: Array, values: Array, usable: NDArray[np.bool_], cuts: Array
-) -> Array:
+def _detrended(t: Array, values: Array, usable: Mask, cuts: Array) -> Array:
     """Samples less slope and means between cuts, (n, 6); zero if not usable."""
     s = (t - t.mean()) / max(np.ptp(t), 1e-9)
     first = np.unique(np.append(0, np.searchsorted(t, cuts[cuts < t[-1]])))

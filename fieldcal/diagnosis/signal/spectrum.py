@@ -87,11 +87,9 @@ def subtract_lines(
     held = long_windows(source, rows)
     x = experience_in_windows(rows, held)
     for tone in found:
-        response = tone.effect.response(x, tone.hz) @ tone.causes
-        where = [
-            (slice(a, b), in_window)
-            for (_, a, b), in_window in zip(held, response, strict=True)
-        ]
+        response = tone.amplitudes(x)
+        pairs = zip(held, response, strict=True)
+        where = [(slice(a, b), in_window) for (_, a, b), in_window in pairs]
         if tone.effect.kind == "sensor":
             where = [(slice(0, len(block)), response[0])]
         for i, own in enumerate((slice(0, 3), slice(3, 6))):
@@ -162,8 +160,7 @@ def _deviations_from_line(
 ) -> tuple[Complex, Complex]:
     """Amplitudes of the windows, and their deviations from one steady line."""
     measured = moments.amplitudes(np.array([tone.hz - moments.near]))[0]
-    modelled = tone.effect.response(pieces.x, tone.hz) @ tone.causes
-    return measured, measured - modelled
+    return measured, measured - tone.amplitudes(pieces.x)
 
 
 def _scatter_between_windows(
@@ -195,7 +192,7 @@ def _in_both_halves(pieces: WindowSamples, tone: SpectralLine) -> bool:
     present in the first half only.
     """
     clear = tone.clear_channels
-    response = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[:, clear]
+    response = tone.amplitudes(pieces.x)[:, clear]
     taken = np.zeros(2)
     for s, t, one in zip(pieces.samples, pieces.times, response, strict=True):
         middle = -(-len(t) // 2)
@@ -230,7 +227,7 @@ def _coherent_part(
 
 def _subtract(pieces: WindowSamples, tone: SpectralLine) -> None:
     """Subtract a line from the samples, in place to save memory."""
-    response = tone.effect.response(pieces.x, tone.hz) @ tone.causes
+    response = tone.amplitudes(pieces.x)
     for samples, t, amplitudes in zip(
         pieces.samples, pieces.times, response, strict=True
     ):

@@ -110,7 +110,7 @@ def _capital(text: str) -> str:
 
 def _none_in_reach(explanation: Explanation) -> str:
     """Beginning of a sentence: no position of the ladder decides, if any is known."""
-    positions = explanation.prepared.source.about.positions
+    positions = explanation.source.about.positions
     if not explanation.rows.x.oriented.all() or not ladder_settings(positions):
         return "To decide: "
     return f"No position {ladder_extent(positions)} decides; what does: "

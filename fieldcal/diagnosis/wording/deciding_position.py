@@ -78,7 +78,7 @@ def deciding_position(
     sd = sd / np.sqrt(len(x) / len(explanation.dictionary.window_positions))
     sd = np.hypot(sd, median_known(rows.window_error))
     since = explanation.dictionary.since[:, -1:]
-    about = explanation.prepared.source.about
+    about = explanation.source.about
     held = [p.degrees for p in about.positions]
     best: DecidingPosition | None = None
     for alpha, beta in ladder_settings(about.positions):

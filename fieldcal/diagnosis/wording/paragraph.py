@@ -219,7 +219,7 @@ def angle_errors_text(turned: Sequence[tuple[str, Quantity]], verb: str = "was")
 
 def setup_notes(explanation: Explanation) -> list[str]:
     """Sentences about turns and base that are no effects of the device."""
-    indices_in_file = explanation.prepared.source.about.indices_in_file
+    indices_in_file = explanation.source.about.indices_in_file
     ways = [indices_in_file(pair) for pair in explanation.untracked_turns]
     notes = [
         f"The turn from position {start + 1} to {end + 1} is not the one that the"

@@ -14,10 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.state import State
-from fieldcal.physics.effect import (
-    NO_SHAPE,
-    Sensor,
-)
+from fieldcal.physics.effect import NO_SHAPE, Sensor
 from fieldcal.physics.experience import Experience
 
 CentralDifference = tuple[Experience, Experience, float]

@@ -87,6 +87,11 @@ class Group:
     random: bool = False
 
     @property
+    def names(self) -> list[str]:
+        """Names of its parameters, of an effect, (k,)."""
+        return [self.effect.params[j].name for j in self.params] if self.effect else []
+
+    @property
     def leading_columns(self) -> Index:
         """Indices, within the group, of the columns of largest typical size.
 
@@ -127,8 +132,11 @@ class Group:
 
     def prior_sigma(self, v: float) -> Array:
         """Prior standard deviation of each column at size v, (k,)."""
-        sigma: Array = v * self.typical
-        return sigma
+        return v * self.typical
+
+    def own_sigma(self, v: float = 1.0) -> Array:
+        """The same at its known size; at size v if that is not known."""
+        return self.prior_sigma(v if self.fixed_size is None else self.fixed_size)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,3 +249,32 @@ class Cause:
     def name_and_part(self) -> tuple[str, str]:
         """Common to causes that differ only in the position they belong to."""
         return self.name, self.part
+
+
+@dataclass(frozen=True, slots=True)
+class EqualWidthGroups:
+    """Groups with equally many leading columns, stacked for joint calculation.
+
+    Attributes
+    ----------
+    blocks : (b, k) distinct sets of columns; several groups may share a set
+    block : (m,) index of each group's set of columns
+    typical : (m, k) typical sizes
+    cause, variant : (m,) indices of each group's cause and variant
+
+    """
+
+    blocks: Index
+    block: Index
+    typical: Array
+    cause: Index
+    variant: Index
+
+    @classmethod
+    def of(cls, groups: Sequence[tuple[int, int, Group]]) -> EqualWidthGroups:
+        """Stack groups; each is given with the indices of its cause and variant."""
+        columns = np.array([g.columns[g.leading_columns] for _, _, g in groups])
+        blocks, block = np.unique(columns, axis=0, return_inverse=True)
+        typical = np.array([g.typical[g.leading_columns] for _, _, g in groups])
+        cause, variant = np.array([(i, j) for i, j, _ in groups]).T
+        return cls(blocks, block.ravel(), typical, cause, variant)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import GYR, Array, Index, Mask
 from fieldcal.model.causes import columns, smooth
 from fieldcal.model.causes.basis import Course, General
-from fieldcal.model.causes.cause import Basis
+from fieldcal.model.causes.cause import TRIADS, Basis
 from fieldcal.model.causes.wander import Wander
 from fieldcal.physics.experience import Experience
 
@@ -40,12 +40,7 @@ class ColumnTable:
     """Whether the turns between windows were recorded."""
 
     def __init__(
-        self,
-        x: Experience,
-        used: NDArray[np.bool_],
-        since: Array,
-        unit: Array,
-        wander: Wander,
+        self, x: Experience, used: Mask, since: Array, unit: Array, wander: Wander
     ) -> None:
         self.x, self.used, self.since, self.unit = x, used, since, unit
         self.observed = np.flatnonzero(np.any(used, axis=0))
@@ -55,26 +50,22 @@ class ColumnTable:
         self.span = smooth.CourseSpan(x.t, int(wander.modes.max()), x.warming)
         self.bases: list[tuple[int, Basis]] = []
         self.width = 0
-        self.bias = self.add(General("bias", columns.bias), 6)
-        self.scale = self.add(General("scale", columns.scale), 6)
-        turns = General(
-            "aside",
-            columns.small_rotation,
-            sides=columns.small_rotation_sides,
-            per_position=True,
-        )
-        self.small_rotation = self.add(turns, 2 * self.position_count)
-        self.windows = self.add_course(
-            "window", self._inside, len(self.window_positions), False
-        )
-        self.waves = self.add_course("waves", self.span.waves, self.span.count, True)
+        sides = columns.small_rotation_sides
+        turns = General("aside", columns.small_rotation, sides, per_position=True)
+        held = len(self.window_positions)
+        self.bias: int = self.add(General("bias", columns.bias), 6)[0]
+        self.scale: int = self.add(General("scale", columns.scale), 6)[0]
+        self.small_rotation: int = self.add(turns, 2 * self.position_count)[0]
+        self.windows: int = self.add_course("window", self._inside, held, False)[0]
+        self.waves: int = self.add_course(
+            "waves", self.span.waves, self.span.count, True
+        )[0]
 
-    def add(self, basis: Basis, width: int) -> int:
-        """Append a basis; returns its first column."""
-        start = self.width
-        self.bases.append((start, basis))
+    def add(self, basis: Basis, width: int) -> Index:
+        """Append a basis; returns its columns, (width,)."""
+        self.bases.append((self.width, basis))
         self.width += width
-        return start
+        return np.arange(self.width - width, self.width)
 
     def basis_ranges(self) -> Iterator[tuple[int, int, Basis]]:
         """First column, end column and basis, of every basis."""
@@ -84,23 +75,32 @@ class ColumnTable:
 
     def add_course(
         self, name: str, of: Callable[[Experience], Array], width: int, timed: bool
-    ) -> int:
-        """Append a function of the row on every channel; returns its first column.
+    ) -> Index:
+        """Append a function of the row on every channel; returns its columns.
 
         `timed` states that the function is also known during turns.
         """
         return self.add(Course(name, lambda v: of(v.x), width, timed), 6 * width)
 
+    @property
+    def has_gyroscopes(self) -> bool:
+        """Whether any gyroscope was measured."""
+        return bool(self.used[:, GYR].any())
+
+    @property
+    def triads(self) -> list[tuple[str, Index]]:
+        """Name of each triad that was measured, with its measured channels."""
+        each = ((part, np.intersect1d(c, self.observed)) for part, c in TRIADS)
+        return [(part, channels) for part, channels in each if len(channels)]
+
     def cosine_columns(self, channel: int, count: int = smooth.MAX_COSINES) -> Index:
         """Columns of the first cosines in time of a channel, (count,)."""
-        at: Index = self.waves + channel * self.span.count + np.arange(count)
-        return at
+        return self.waves + channel * self.span.count + np.arange(count)
 
     def window_columns(self, channel: int) -> Index:
         """Columns of the offsets of a channel's windows, (p,)."""
         count = len(self.window_positions)
-        at: Index = self.windows + channel * count + np.arange(count)
-        return at
+        return self.windows + channel * count + np.arange(count)
 
     @property
     def rotations(self) -> slice:
@@ -110,8 +110,7 @@ class ColumnTable:
     def rotations_of(self, positions: ArrayLike) -> Index:
         """Columns of the small rotations of some positions, two of each, (2 m,)."""
         first = 2 * np.atleast_1d(positions)[:, None]
-        at: Index = (self.small_rotation + first + [0, 1]).ravel()
-        return at
+        return (self.small_rotation + first + [0, 1]).ravel()
 
     def _inside(self, x: Experience) -> Array:
         inside: Array = np.equal.outer(x.position, self.window_positions).astype(float)

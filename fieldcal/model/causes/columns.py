@@ -6,7 +6,7 @@ the Earth's rate, attitudes and small rotations of positions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -54,16 +54,22 @@ def speed(known: Array) -> Callable[[RowView], Array]:
     return of
 
 
+def state_sides(
+    plain: Experience, state: State, name: str, steps: Iterable[Array]
+) -> Iterator[CentralDifference]:
+    """Inputs for each of some steps of an array of the state, up and down.
+
+    `name` is that of the array; a step has the same value where it is not zero.
+    """
+    for step in steps:
+        ends = ({name: getattr(state, name) + s * step} for s in (1.0, -1.0))
+        up, down = (replace(state, **end).experienced(plain) for end in ends)
+        yield up, down, float(step.max())
+
+
 def earth_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
     """Inputs for a change of the base's rate about each of its axes, rad/s."""
-    for axis in np.eye(3):
-        up, down = (
-            replace(state, earth=state.earth + sign * EARTH_RATE * axis).experienced(
-                plain
-            )
-            for sign in (1.0, -1.0)
-        )
-        yield up, down, EARTH_RATE
+    return state_sides(plain, state, "earth", EARTH_RATE * np.eye(3))
 
 
 earth = central_differences(earth_sides)
@@ -122,24 +128,16 @@ def attitude(view: RowView) -> Array:
 
 def attitude_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
     """Inputs for a change of the measured attitudes about each base axis, rad."""
-    known = state.attitude
-    if not known.any():
-        known = np.zeros((len(state.small_rotation), 3))
-    for step in ROTATION_STEP_RAD * np.eye(3):
-        ends = (replace(state, attitude=known + s * step) for s in (1.0, -1.0))
-        up, down = (shifted.experienced(plain) for shifted in ends)
-        yield up, down, ROTATION_STEP_RAD
+    if not state.attitude.any():
+        state = replace(state, attitude=np.zeros((len(state.small_rotation), 3)))
+    return state_sides(plain, state, "attitude", ROTATION_STEP_RAD * np.eye(3))
 
 
 def small_rotation_sides(
     plain: Experience, state: State
 ) -> Iterator[CentralDifference]:
     """Inputs for two small rotations of every position, rad."""
-    small = state.small_rotation
-    for step in ROTATION_STEP_RAD * np.eye(2):
-        ends = (replace(state, small_rotation=small + s * step) for s in (1.0, -1.0))
-        up, down = (shifted.experienced(plain) for shifted in ends)
-        yield up, down, ROTATION_STEP_RAD
+    return state_sides(plain, state, "small_rotation", ROTATION_STEP_RAD * np.eye(2))
 
 
 def small_rotation(view: RowView) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -62,15 +62,10 @@ def detent_columns(table: ColumnTable, shared: Sequence[Detent]) -> Index:
 
     def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
         """Inputs for a change of each detent's error, a step up and down."""
-        small = state.small_rotation
-        for column in rotations.T:
-            step = columns.ROTATION_STEP_RAD * column.reshape(small.shape)
-            ends = (replace(state, small_rotation=small + s * step) for s in (1, -1))
-            up, down = (shifted.experienced(plain) for shifted in ends)
-            yield up, down, columns.ROTATION_STEP_RAD
+        steps = columns.ROTATION_STEP_RAD * rotations.T.reshape(len(shared), -1, 2)
+        return columns.state_sides(plain, state, "small_rotation", steps)
 
     basis = General(
         "detents", lambda v: columns.small_rotation(v) @ rotations, sides=sides
     )
-    at: Index = table.add(basis, len(shared)) + np.arange(len(shared))
-    return at
+    return table.add(basis, len(shared))

@@ -15,20 +15,30 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
-from fieldcal.model.causes.basis import Course, General
-from fieldcal.model.causes.cause import CLOSURE, MIN_WINDOWS, TRIADS, Cause, Group
+from fieldcal.model.causes.basis import General
+from fieldcal.model.causes.cause import (
+    CLOSURE,
+    MIN_WINDOWS,
+    Cause,
+    EqualWidthGroups,
+    Group,
+)
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
-from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.causes.random_causes import random_causes, series_flicker
+from fieldcal.model.causes.site_groups import (
+    gravity_group,
+    rounding_group,
+    speed_group,
+    unoriented_earth_groups,
+)
 from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.causes.wander import Wander
 from fieldcal.physics.experience import Experience
@@ -67,7 +77,7 @@ class Dictionary(ColumnTable):
     def __init__(
         self,
         x: Experience,
-        used: NDArray[np.bool_],
+        used: Mask,
         since: Array,
         common: Array,
         unit: Array,
@@ -79,9 +89,9 @@ class Dictionary(ColumnTable):
         self.window_error, self.turns = common, turns
         self.earth = self.attitude = -1
         self.always: list[Group] = [
-            *self._calibration(), *self._gravity(), *self._unoriented_earth(),
-            *self._attitudes(), *self._speeds(), *self._filters(),
-            *self._shared_rounding(shared_error),
+            *self._calibration(), *gravity_group(self), *self._unoriented_earth(),
+            *self._attitudes(), *speed_group(self), *self._filters(),
+            *rounding_group(self, shared_error),
         ]  # fmt: skip
         self.unoriented = np.array(
             [self._is_unoriented(p) for p in self.window_positions]
@@ -108,8 +118,7 @@ class Dictionary(ColumnTable):
 
     def instability_sigma(self, instability: Sequence[int]) -> Array:
         """Standard deviation (7,) of instabilities, from indices in `priors.SIZES`."""
-        sigma: Array = priors.SIZES[list(instability)] * self.typical_instability
-        return sigma
+        return priors.SIZES[list(instability)] * self.typical_instability
 
     def independent_copy(self) -> Self:
         """A copy to which columns can be added without changing this one."""
@@ -165,7 +174,7 @@ class Dictionary(ColumnTable):
         return np.where(out > 0, out, 1.0)
 
     @cached_property
-    def shown(self) -> NDArray[np.bool_]:
+    def shown(self) -> Mask:
         """Columns that are visible in windows; set by the first linearisation."""
         return np.zeros(self.width, dtype=bool)
 
@@ -177,33 +186,30 @@ class Dictionary(ColumnTable):
 
     def _calibration(self) -> Iterator[Group]:
         """Groups of bias, scale factor and Earth's rate."""
-        sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
-        for part, channels in TRIADS:
-            at = np.intersect1d(channels, self.observed)
-            if len(at):
-                yield Group("bias", part, self.bias + at, sizes[at], in_state=True)
-        rated = bool(self.x.rate.any())
-        for part, channels in TRIADS:
-            at = np.intersect1d(channels, self.observed)
-            if len(at) and (part == "acc" or rated):
+        sizes = priors.BIAS * self.unit
+        for part, at in self.triads:
+            yield Group("bias", part, self.bias + at, sizes[at], in_state=True)
+        for part, at in self.triads:
+            if part == "acc" or self.x.rate.any():
                 yield Group(
                     "scale", part, self.scale + at, priors.SCALE * self.unit[at],
                     in_state=True, changes_together=True,
                 )  # fmt: skip
-        gyro = bool(len(np.intersect1d(self.observed, (3, 4, 5))))
-        if gyro and self.x.oriented.any() and not self.x.base_rate.any():
-            earth = General("earth", columns.earth, sides=columns.earth_sides)
-            self.earth = self.add(earth, 3)
+        known = self.x.oriented.any() and not self.x.base_rate.any()
+        if self.has_gyroscopes and known:
             size = np.full(3, EARTH_RATE)
-            at = self.earth + np.arange(3)
-            yield Group("earth", "", at, size, fixed_size=1.0, in_state=True)
+            yield Group("earth", "", self.add_earth(), size,
+                        fixed_size=1.0, in_state=True)  # fmt: skip
 
-    def _gravity(self) -> Iterator[Group]:
-        """Group of the uncertainty of gravity, which all accelerometers share."""
-        if self.x.gravity_sigma and np.isin(self.observed, (0, 1, 2)).any():
-            at = self.add(General("gravity", columns.gravity), 1)
-            size = np.array([self.x.gravity_sigma / self.x.gravity])
-            yield Group("gravity", "acc", np.array([at]), size, fixed_size=1.0)
+    def add_earth(self) -> Index:
+        """Append the columns of the base's rate about each of its axes, (3,) rad/s."""
+        at = self.add(General("earth", columns.earth, columns.earth_sides), 3)
+        self.earth = int(at[0])
+        return at
+
+    def _unoriented_earth(self) -> Iterator[Group]:
+        """Groups of the Earth's rate in positions of unknown orientation."""
+        yield from unoriented_earth_groups(self)
 
     def _attitudes(self) -> Iterator[Group]:
         """Group of the errors of attitudes that have a stated uncertainty."""
@@ -212,67 +218,18 @@ class Dictionary(ColumnTable):
         if not np.isfinite(sigma).any():
             return
         sides = columns.attitude_sides
-        basis = General("attitude", columns.attitude, sides=sides, per_position=True)
-        self.attitude = self.add(basis, 3 * self.position_count)
+        basis = General("attitude", columns.attitude, sides, per_position=True)
+        every = self.add(basis, 3 * self.position_count)
+        self.attitude = int(every[0])
         known = np.isfinite(sigma)
-        at = self.attitude + 3 * self.window_positions[known][:, None] + np.arange(3)
+        at = every.reshape(-1, 3)[self.window_positions[known]].ravel()
         wide = np.repeat(sigma[known], 3)
-        yield Group("attitude", "", at.ravel(), wide, fixed_size=1.0, in_state=True)
-
-    def _speeds(self) -> Iterator[Group]:
-        """Group of the errors of a rate table's speeds, if its axis is not known.
-
-        There is one relative error for each speed. It includes the Earth's rate along
-        the axis of the table, which does not depend on the orientation of the device.
-        """
-        known = np.unique(self.x.speed[self.x.speed > 0])
-        if not len(known) or not np.isin(self.observed, (3, 4, 5)).any():
-            return
-        at = self.add(General("speed", columns.speed(known)), len(known))
-        error = np.array([self.x.speed_sigma[self.x.speed == v].max() for v in known])
-        wide = np.hypot(error, EARTH_RATE / 3**0.5) / known
-        yield Group("speed", "gyr", at + np.arange(len(known)), wide, fixed_size=1.0)
+        yield Group("attitude", "", at, wide, fixed_size=1.0, in_state=True)
 
     def _filters(self) -> Iterator[Group]:
         """Group of the sensors' filters during turns."""
-        if self.turns and np.isin(self.observed, (3, 4, 5)).any():
+        if self.turns and self.has_gyroscopes:
             yield filtered_turns(self)
-
-    def _unoriented_earth(self) -> Iterator[Group]:
-        """Groups of the Earth's rate in positions of unknown orientation.
-
-        In a session of one position it is part of the bias.
-        """
-        if (
-            not np.isin(self.observed, (3, 4, 5)).any()
-            or len(self.window_positions) < 2
-        ):
-            return
-        shown = self.x.earth_seen
-        if shown.any():
-            basis = General("earth aside", columns.earth_rate_direction)
-            held = np.unique(self.x.position[shown])
-            own = (2 * held[:, None] + [0, 1]).ravel()
-            wide = np.full(len(own), 1 / priors.FREE_SIZE)
-            own = self.add(basis, 2 * self.position_count) + own
-            yield Group("earth aside", "gyr", own, wide, fixed_size=priors.FREE_SIZE)
-        if self.x.earth_unseen.any():
-            at = self.add(General("earth anyhow", columns.earth_rate_unoriented), 4)
-            size = EARTH_RATE * np.array([3**-0.5, 3**-0.5, 3**-0.5, 1.0])
-            yield Group("earth anyhow", "gyr", at + np.arange(4), size, fixed_size=1.0)
-
-    def _shared_rounding(self, sizes: Array | None) -> Iterator[Group]:
-        """Group of the errors of rounding and of dead bands that all windows share.
-
-        They act while an output keeps its value; where outputs change they average out.
-        """
-        if sizes is None or not len(some := np.flatnonzero(sizes)):
-            return
-        even = Course(
-            "rounding", lambda v: np.ones((len(v.x.t), 1)), 1, while_output_stands=True
-        )
-        at = self.add(even, 6)
-        yield Group("rounding", "", at + some, sizes[some], fixed_size=1.0)
 
     def _is_unoriented(self, p: int) -> bool:
         """Whether the direction of a position's force, or of its rate, is not known."""
@@ -285,8 +242,8 @@ class Dictionary(ColumnTable):
         """Set the typical instability of windows, by channel, and of closures."""
         self.typical_instability = np.zeros(7)
         if len(self.window_positions) >= MIN_WINDOWS:
-            typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3)
-            self.typical_instability[:6] = typical * self.unit * self.used.any(axis=0)
+            measured = self.used.any(axis=0)
+            self.typical_instability[:6] = priors.INSTABILITY * self.unit * measured
             self.typical_instability[CLOSURE] = priors.CLOSURE_RAD * self.turns
 
     def add_shape_values(

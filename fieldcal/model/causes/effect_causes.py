@@ -9,7 +9,6 @@ from itertools import combinations
 
 import numpy as np
 
-from fieldcal.core.factory import WARM_UP_TIME_CONSTANT, WARMING_EFFECTS, FactoryErrors
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Index
 from fieldcal.effects import catalogue
@@ -20,7 +19,6 @@ from fieldcal.model.causes.effect_columns import (
     effect_basis,
     separable_basis,
 )
-from fieldcal.model.causes.hysteresis import hysteresis
 from fieldcal.physics.effect import (
     NO_SHAPE,
     BiasChange,
@@ -88,47 +86,6 @@ def effect_group(
     )
 
 
-def factory_group(
-    table: ColumnTable,
-    name: str,
-    size: Array,
-    turned: bool,
-    point: Point = NO_POINT,
-) -> Group:
-    """Group of a factory error, whose coefficients have the known sigma `size`, SI."""
-    group = effect_group(table, name, turned, point)
-    wide = (size * units_of(table, catalogue()[name]))[list(group.params)]
-    return replace(group, cause="factory", part=name, typical=wide, fixed_size=1.0)
-
-
-def factory_groups(
-    table: ColumnTable, left: FactoryErrors, turned: bool
-) -> list[Group]:
-    """Groups of the factory errors `left`, which are included and not reported.
-
-    Biases follow the temperature if a thermometer shows a change, and the warm-up of
-    the package otherwise.
-    """
-    if not table.x.f.any():
-        return []
-    shapes = {WARMING_EFFECTS[1]: {"tau_s": WARM_UP_TIME_CONSTANT}}
-    return [
-        hysteresis(table, float(size[0]))
-        if name == "hysteresis"
-        else factory_group(table, name, size, turned, (shapes.get(name, {}), 0))
-        for name, size in factory_sizes(table.x, left).items()
-        if size.any()
-    ]
-
-
-def factory_sizes(x: Experience, left: FactoryErrors) -> dict[str, Array]:
-    """Standard deviation, SI, of each factory error by name: (1,), or (6,)."""
-    sizes = {name: np.array([size]) for name, size in left.by_effect.items()}
-    sizes["hysteresis"] = np.array([left.hysteresis])
-    name, per_k = left.warming_effect(x.warms)
-    return sizes | {name: np.array(per_k)}
-
-
 def groups_at_points(
     table: ColumnTable, group: Group, grid: Sequence[Point]
 ) -> list[Group]:
@@ -165,17 +122,13 @@ def effect_columns(
     """Append the columns of an effect; indices (k,) for each grid point."""
     count = len(effect.params)
     if isinstance(effect, BiasChange):
-        course = bias_change_basis(effect, grid)
-        start = table.add(course, 6 * len(grid))
-        channel = np.array([CHANNELS.index(p.name) for p in effect.params])
-        return [start + channel * len(grid) + i for i in range(len(grid))]
+        at = table.add(bias_change_basis(effect, grid), 6 * len(grid))
+        channel = [CHANNELS.index(p.name) for p in effect.params]
+        return list(at.reshape(6, len(grid))[channel].T)
     if isinstance(effect, Separable):
-        start = table.add(separable_basis(effect, grid), count * len(grid))
-        return [start + i * count + np.arange(count) for i in range(len(grid))]
-    return [
-        table.add(effect_basis(effect, *point), count) + np.arange(count)
-        for point in grid
-    ]
+        at = table.add(separable_basis(effect, grid), count * len(grid))
+        return list(at.reshape(len(grid), count))
+    return [table.add(effect_basis(effect, *point), count) for point in grid]
 
 
 def parameter_groups(

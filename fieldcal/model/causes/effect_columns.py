@@ -71,10 +71,7 @@ def _motion_basis(effect: Motion) -> General:
     def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
         turned = state.turned(plain)
         for step in steps():
-            up, down = (
-                _with_changed_parameters(turned, state, effect, s)
-                for s in (step, -step)
-            )
+            up, down = (_changed(turned, state, effect, s) for s in (step, -step))
             yield up, down, float(step.max())
 
     def on_the_way(view: RowView) -> Array:
@@ -118,13 +115,12 @@ def separable_basis(
             product = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
             parts.append(product.reshape(len(view.x), 6, -1))
         gain = effect.gain(view.state.scale)[:, None]
-        columns: Array = np.concatenate(parts, axis=2) * gain
-        return columns
+        return np.concatenate(parts, axis=2) * gain
 
     return General(effect.id, of)
 
 
-def _with_changed_parameters(
+def _changed(
     turned: Experience, state: State, effect: Effect, more: Array
 ) -> Experience:
     """Inputs with the parameters of a motion effect changed by `more`.

@@ -37,9 +37,7 @@ FILTERED = "bandwidth"
 
 def filtered_turns(table: ColumnTable) -> Group:
     """Group with six columns: v, c and r, each of accelerometers and of gyroscopes."""
-    at = table.add(
-        General(FILTERED, _filter_columns, needs_whole_turn=True), 6
-    ) + np.arange(6)
+    at = table.add(General(FILTERED, _filter_columns, needs_whole_turn=True), 6)
     tau = priors.FILTERED_S
     size = np.repeat([tau**2, 2 * tau**3, 3 * tau**4], 2)
     return Group("device", FILTERED, at, size, fixed_size=1.0)

@@ -116,12 +116,10 @@ def _covariance(start: Array, end: Array) -> Array:
         - _integrated(np.subtract.outer(end, end))
         + _integrated(np.subtract.outer(start, end))
     )
-    out: Array = -0.5 * integral / np.outer(length, length)  # (1)
-    return out
+    return -0.5 * integral / np.outer(length, length)  # (1)
 
 
 def _integrated(x: Array) -> Array:
     """H(x), whose second derivative is ln|x|."""
     size = np.maximum(np.abs(x), 1e-12)
-    out: Array = x**2 * (np.log(size) / 2 - 0.75)
-    return out
+    return x**2 * (np.log(size) / 2 - 0.75)

@@ -56,9 +56,9 @@ def leaning(table: ColumnTable) -> Group | None:
         out *= view.state.scale[:, None]
         return out
 
-    start = table.add(General("leaning", columns), int(first[-1]))
+    at = table.add(General("leaning", columns), int(first[-1]))
     size = priors.LEAN_RAD / np.concatenate([[*np.arange(1, n + 1)] * 2 for n in waves])
-    return Group("leaning", "", start + np.arange(first[-1]), size, random=True)
+    return Group("leaning", "", at, size, random=True)
 
 
 def _share(leans: Index) -> float:

@@ -107,15 +107,16 @@ class MotionDictionary(Dictionary):
             turned = view.state.scale[:, None] * rotation[:, missing]
             return np.broadcast_to(turned, (len(view.x), 6, len(missing)))
 
-        self.clock = self.add(General("clock", clock), 2)
+        at = self.add(General("clock", clock), 2)
+        self.clock = int(at[0])
         sizes = np.array([priors.CLOCK_S, priors.CLOCK_RATE])
-        yield Group("clock", "", self.clock + np.arange(2), sizes, fixed_size=free)
-        self.turn = self.add(General("turn", turn), 3)
-        at = self.turn + np.arange(3)
+        yield Group("clock", "", at, sizes, fixed_size=free)
+        at = self.add(General("turn", turn), 3)
+        self.turn = int(at[0])
         yield Group("turn", "", at, np.full(3, priors.AXES_TURNED), fixed_size=free)
         if len(missing):
-            self.unseen = self.add(General("unseen", unseen), len(missing))
-            at = self.unseen + np.arange(len(missing))
+            at = self.add(General("unseen", unseen), len(missing))
+            self.unseen = int(at[0])
             wide = priors.UNSEEN.copy()
             wide[np.flatnonzero(current.rows.alignment.unseen_gravity)] = priors.UPRIGHT
             yield Group("unseen", "", at, wide[missing], fixed_size=1.0)

@@ -135,7 +135,6 @@ def _column(parts: dict[str, Array], name: str) -> Array:
     parameter = ParameterName.of(name)
     group = parameter.group
     if parameter.sensor == "acc":
-        one: Array = parts[group][:, :, parameter.axis]
-        return one
+        return parts[group][:, :, parameter.axis]
     at = catalogue()[group].names.index(parameter.component)
     return np.asarray(parts[group][:, :, at])

@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
+from fieldcal.model.causes.cause import MIN_WINDOWS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
@@ -21,12 +21,8 @@ from fieldcal.physics.effect import CHANCE, Scatter
 
 def random_causes(table: ColumnTable) -> Iterator[Cause]:
     """Causes of random effects, of noise that devices have, and of wrong angles."""
-    oriented = table.window_positions[
-        [
-            bool(table.x.oriented[table.x.position == p].all())
-            for p in table.window_positions
-        ]
-    ]
+    held = table.window_positions
+    oriented = held[[table.x.oriented[table.x.position == p].all() for p in held]]
     for effect in catalogue().values():
         if isinstance(effect, Scatter) and effect.applies(table.x):
             yield from _causes_of_scatter(table, effect, oriented)
@@ -94,24 +90,16 @@ def _causes_of_scatter(
         group = Group(effect.id, "", at, size, effect, in_state=True)
         yield Cause(effect.id, "", effect.chance(table.x), (group,), "random")
         return
-    for part, channels in TRIADS:
-        observed = [c for c in channels if c in table.observed]
-        if observed:
-            yield _walks(table, effect, part, [observed], 1.0)
-            single = [[c] for c in observed]
-            yield _walks(
-                table, effect, f"{part}, one axis", single, priors.SINGLE_AXIS_SHARE
-            )
+    for part, channels in table.triads:
+        yield _walks(table, effect, part, channels[None], 1.0)
+        alone = f"{part}, one axis"
+        yield _walks(table, effect, alone, channels[:, None], priors.SINGLE_AXIS_SHARE)
 
 
 def _walks(
-    table: ColumnTable,
-    effect: Scatter,
-    part: str,
-    channel_sets: Sequence[Sequence[int]],
-    share: float,
+    table: ColumnTable, effect: Scatter, part: str, channel_sets: Index, share: float
 ) -> Cause:
-    """Cause of random walks, with a variant for each set of channels.
+    """Cause of random walks, with a variant for each set of channels, (sets, k).
 
     `share` is the part of the probability of the effect that this cause has.
     """
@@ -127,7 +115,7 @@ def _walks(
             effect,
             params=tuple(channels),
         )
-        for channels in channel_sets
+        for channels in channel_sets.tolist()
     )  # fmt: skip
     return Cause(effect.id, part, share * effect.chance(table.x), groups, "random")
 
@@ -140,38 +128,26 @@ def _cosine_flicker(table: ColumnTable) -> Iterator[Group]:
     modes = table.wander.modes
     cosines = [table.cosine_columns(c, modes[c]) for c in range(6)]
     shape = 1 / np.sqrt(np.arange(1, modes.max() + 1))
-    sizes = priors.FLICKER_ACC, priors.FLICKER_GYR
-    yield from _flicker_groups(table, cosines, shape, sizes)
+    yield from _flicker_groups(table, cosines, shape, priors.FLICKER)
 
 
 def series_flicker(table: ColumnTable, series: FlickerSeries) -> Iterator[Group]:
     """Flicker of each triad as a series, for few windows without other instability."""
     many = len(series.sizes)
-    first = table.add_course("flicker", lambda x: series.at(x.t), many, True)
-    at = first + np.arange(6 * many).reshape(6, many)
-    sizes = priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
-    yield from _flicker_groups(table, list(at), series.sizes, sizes)
+    at = table.add_course("flicker", lambda x: series.at(x.t), many, True)
+    terms = list(at.reshape(6, many))
+    yield from _flicker_groups(table, terms, series.sizes, priors.INSTABILITY)
 
 
 def _flicker_groups(
-    table: ColumnTable,
-    terms: Sequence[Index],
-    shape: Array,
-    sizes: tuple[float, float],
+    table: ColumnTable, terms: Sequence[Index], shape: Array, sizes: Array
 ) -> Iterator[Group]:
     """Group of the flicker of each triad.
 
-    Parameters
-    ----------
-    terms : columns of the series of each of the six channels
-    shape : (k,) relative standard deviation of each term of a series
-    sizes : typical sizes of accelerometers and gyroscopes, SI
-
+    `terms` are the columns of the series of each of the six channels, `shape` (k,) the
+    relative standard deviations of the terms, and `sizes` (6,) the typical sizes, SI.
     """
-    for part, channels in TRIADS:
-        at = [c for c in channels if c in table.observed]
-        if at:
-            columns = np.concatenate([terms[c] for c in at])
-            size = sizes[part == "gyr"]
-            wide = [shape[: len(terms[c])] * size * table.unit[c] for c in at]
-            yield Group("flicker", part, columns, np.concatenate(wide), random=True)
+    for part, at in table.triads:
+        columns = np.concatenate([terms[c] for c in at])
+        wide = [shape[: len(terms[c])] * sizes[c] * table.unit[c] for c in at]
+        yield Group("flicker", part, columns, np.concatenate(wide), random=True)

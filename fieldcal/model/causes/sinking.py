@@ -71,7 +71,7 @@ def sinking(table: ColumnTable) -> Group | None:
         )
         return out
 
-    start = table.add(General(NAME, columns), 2 * POLYNOMIALS)
+    at = table.add(General(NAME, columns), 2 * POLYNOMIALS)
     fading = priors.SINK_FADING ** np.arange(POLYNOMIALS)
     size = np.tile(np.rad2deg(priors.SINK_RAD) * fading, 2)
-    return Group(NAME, "", start + np.arange(len(size)), size, random=True)
+    return Group(NAME, "", at, size, random=True)

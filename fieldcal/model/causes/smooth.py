@@ -66,24 +66,26 @@ class CourseSpan:
     def waves(self, x: Experience) -> Array:
         """Means of cosines of the time over the rows, (n, count)."""
         k = np.arange(1, self.count + 1)
-        part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
+        part = self._part(x)
         few, at = np.unique(x.lasts.round(6), return_inverse=True)
         mean = np.sinc(np.outer(few / (2 * self.length), k))[at]
-        out: Array = np.cos(np.pi * np.outer(part, k)) * mean
-        return out
+        return np.cos(np.pi * np.outer(part, k)) * mean
+
+    def _part(self, x: Experience) -> Array:
+        """Time of the rows as a part of the session, 0 to 1, (n,)."""
+        part: Array = (x.t - self.start) / self.length
+        return part.clip(0.0, 1.0)
 
     def fading(self, x: Experience) -> Array:
         """Force along each axis, in gravities, times polynomials of time, (n, 12)."""
-        part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
-        steps = np.polynomial.legendre.legvander(2 * part - 1, TIME_POWERS)[:, 1:]
+        part = 2 * self._part(x) - 1
+        steps = np.polynomial.legendre.legvander(part, TIME_POWERS)[:, 1:]
         f = x.f / x.gravity
-        out: Array = (f[:, :, None] * steps[:, None, :]).reshape(len(x), -1)
-        return out
+        return (f[:, :, None] * steps[:, None, :]).reshape(len(x), -1)
 
     def temperature(self, x: Experience) -> Array:
         """Powers 1 to 4 of the temperature, as a part of its range, (n, 4)."""
-        part = (np.nan_to_num(x.warming) - self.cold) / self.range
-        return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
+        return _powers((np.nan_to_num(x.warming) - self.cold) / self.range)
 
     def walk(self) -> Array:
         """Standard deviation of each cosine in a walk of 1 per sqrt(s), (count,)."""
@@ -123,8 +125,7 @@ def joints(x: Experience) -> Array:
     """Products of harmonics of both joints' angles."""
     # the sines and cosines of the first two harmonics of each angle
     first, second = (_angle(a)[:, [0, 1, 4, 5]] for a in (x.alpha, x.beta))
-    out: Array = (first[:, :, None] * second[:, None, :]).reshape(len(x), -1)
-    return out
+    return (first[:, :, None] * second[:, None, :]).reshape(len(x), -1)
 
 
 def _angle(angle: Array) -> Array:
@@ -144,6 +145,11 @@ def force(x: Experience) -> Array:
 def since_turn(x: Experience) -> Array:
     """Powers of the logarithm of the time since the turn."""
     part = np.log1p(np.clip(x.since_turn, 0.0, MAX_SINCE_TURN_S)) / np.log1p(100.0)
+    return _powers(part)
+
+
+def _powers(part: Array) -> Array:
+    """Powers 1 to 4 of a part of a range, by their number, (n, 4)."""
     return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
 
 

@@ -55,6 +55,6 @@ def turn_gyro_errors(table: ColumnTable) -> Iterator[Cause]:
     for i, k in enumerate(turns):
         size = priors.LOST_TURN_RAD / seconds[k] * np.abs(table.unit[3:])
         ends = (int(held[k]), int(held[k + 1]))
-        own = at + 3 * i + np.arange(3)
+        own = at[3 * i : 3 * i + 3]
         group = Group(f"way {k}", "gyr", own, size, moved_positions=ends, random=True)
         yield Cause(group.cause, "gyr", chance, (group,), "noise")

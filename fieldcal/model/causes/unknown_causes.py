@@ -6,14 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import ACC, CHANNELS, Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes import smooth
-from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
+from fieldcal.model.causes.cause import MIN_WINDOWS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-
-ACC_CHANNELS = 3
-"""Number of accelerometer channels."""
 
 
 def unknown_causes(table: ColumnTable) -> Iterator[Cause]:
@@ -21,11 +18,7 @@ def unknown_causes(table: ColumnTable) -> Iterator[Cause]:
     sizes = typical_unknown_sizes(table)
     for c in table.observed.tolist():
         if _has_times(table):
-            groups = [
-                _smooth_course(table, CHANNELS[c], [c], sizes, span)
-                for span in smooth.HALF_WAVES
-            ]
-            yield _cause("time", CHANNELS[c], groups)
+            yield _course_cause(table, CHANNELS[c], [c], sizes)
         at = table.window_columns(c)
         if len(table.window_positions) > 3:
             groups = [
@@ -39,8 +32,9 @@ def unknown_causes(table: ColumnTable) -> Iterator[Cause]:
             yield _cause(
                 "position", CHANNELS[c], [Group("position", CHANNELS[c], at, wide)]
             )
-    if _has_times(table):
-        yield from _triad_courses(table, sizes)
+    for part, channels in table.triads if _has_times(table) else ():
+        if len(channels) > 1:
+            yield _course_cause(table, part, channels, sizes)
     yield from _covariate_causes(table, sizes)
 
 
@@ -51,31 +45,20 @@ def _has_times(table: ColumnTable) -> bool:
 
 def typical_unknown_sizes(table: ColumnTable) -> Array:
     """Typical size of functions without physics on each channel, (6,), outputs."""
-    out: Array = np.repeat([priors.UNKNOWN_ACC, priors.UNKNOWN_GYR], 3) * table.unit
-    return out
+    return priors.UNKNOWN * table.unit
 
 
-def _triad_courses(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
-    """Causes of a course in time on all axes of a triad at once."""
-    for part, channels in TRIADS:
-        observed = [c for c in channels if c in table.observed]
-        if len(observed) < 2:
-            continue
-        groups = [
-            _smooth_course(table, part, observed, sizes, span)
-            for span in smooth.HALF_WAVES
-        ]
-        yield _cause("time", part, groups)
-
-
-def _smooth_course(
-    table: ColumnTable, part: str, channels: Sequence[int], sizes: Array, span: float
-) -> Group:
-    """Group of a smooth course in time on some channels."""
-    shape = smooth.smooth_course_sizes(span)
-    waves = np.concatenate([table.cosine_columns(c, len(shape)) for c in channels])
-    size = np.outer(sizes[channels], shape).ravel()
-    return Group("time", part, waves, size, shape={"waves": span})
+def _course_cause(
+    table: ColumnTable, part: str, channels: Sequence[int] | Index, sizes: Array
+) -> Cause:
+    """Cause of a smooth course in time on some channels at once."""
+    groups = []
+    for span in smooth.HALF_WAVES:
+        shape = smooth.smooth_course_sizes(span)
+        waves = np.concatenate([table.cosine_columns(c, len(shape)) for c in channels])
+        size = np.outer(sizes[channels], shape).ravel()
+        groups.append(Group("time", part, waves, size, shape={"waves": span}))
+    return _cause("time", part, groups)
 
 
 def _covariate_causes(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
@@ -84,17 +67,15 @@ def _covariate_causes(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
         if not _covers(table, covariate):
             continue
         width = of(table.x).shape[1]
-        first = table.add_course(covariate, of, width, False)
+        every = table.add_course(covariate, of, width, False).reshape(6, width)
         for c in table.observed.tolist():
-            at = first + c * width + np.arange(width)
-            parts = [at]
-            if covariate == "force and time" and c < ACC_CHANNELS:
-                parts.append(
-                    at[smooth.force_time_columns(c)]
-                )  # a scale factor that changes
+            parts = [every[c]]
+            if covariate == "force and time" and c < ACC.stop:
+                # a scale factor that changes
+                parts.append(every[c, smooth.force_time_columns(c)])
             groups = [
-                Group(covariate, CHANNELS[c], columns, np.full(len(columns), sizes[c]))
-                for columns in parts
+                Group(covariate, CHANNELS[c], at, np.full(len(at), sizes[c]))
+                for at in parts
             ]
             yield _cause(covariate, CHANNELS[c], groups)
 

@@ -80,10 +80,8 @@ class Wander:
     @classmethod
     def of(cls, rows: Rows, unit: Array) -> Wander:
         """Estimate it from rows; `unit` (6,) are outputs per SI unit."""
-        length, (speed, flicker, share) = (
-            float(np.ptp(rows.x.t)),
-            wander_sizes(rows, unit),
-        )
+        length = float(np.ptp(rows.x.t))
+        speed, flicker, share = wander_sizes(rows, unit)
         information = np.where(rows.used, 1 / rows.sd**2, 0.0).sum(axis=0) / 2
         walks = speed * np.sqrt(2 * length * information) / np.pi  # (5)
         resolved = np.fmax(walks, flicker**2 * information)  # (5)
@@ -95,12 +93,8 @@ class Wander:
         if not len(np.unique(rows.x.position)) < MIN_WINDOWS < len(rows.x):
             return out
         series = FlickerSeries.of(rows.x.t, rows.length)
-        typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3) * unit
-        return replace(
-            out,
-            series=series,
-            unseen=series.residual_variance(rows.y, rows.sd, typical),
-        )
+        unseen = series.residual_variance(rows.y, rows.sd, priors.INSTABILITY * unit)
+        return replace(out, series=series, unseen=unseen)
 
     @classmethod
     def none(cls) -> Wander:
@@ -121,8 +115,7 @@ class Wander:
         # rows have few different lengths, except for rounding errors of their times
         few, at = np.unique(length.round(6), return_inverse=True)
         walks = q**2 * _residual_of_walk(self.length, few, count)
-        out: Array = (walks + a**2 * _residual_of_flicker(self.length, few, count))[at]
-        return out
+        return (walks + a**2 * _residual_of_flicker(self.length, few, count))[at]
 
     def residual_covariance(
         self, t: Array, length: Array, channels: Sequence[int] = range(6)
@@ -177,5 +170,4 @@ def _residual_of_flicker(whole: float, length: Array, count: int) -> Array:
 
 def _means(z: Array, k: Index) -> Array:
     """Means m_k of cosines over intervals, (n, k)."""
-    out: Array = np.sinc(np.multiply.outer(z, k) / (2 * np.pi))
-    return out
+    return np.sinc(np.multiply.outer(z, k) / (2 * np.pi))

@@ -89,8 +89,7 @@ class Differences(NamedTuple):
         variance = self.white + np.multiply.outer(squared_sizes, unit_variance)
         median = np.median(self.squares / variance, axis=1)
         ratio = np.maximum(median / CHI2_MEDIAN, MIN_RATIO)
-        out: Array = -self.independent / 2 * (np.log(ratio) / MEDIAN_LOG_SCATTER) ** 2
-        return out
+        return -self.independent / 2 * (np.log(ratio) / MEDIAN_LOG_SCATTER) ** 2
 
 
 def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
@@ -103,15 +102,12 @@ def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
     are outputs per SI unit.
     """
     walk, walk_chance = _typical_walk(rows)
-    flicker = np.repeat([priors.FLICKER_ACC, priors.FLICKER_GYR], 3)
     out, evidence = np.zeros((2, 6)), np.zeros((2, 6))
     few = len(np.unique(rows.x.position)) < MIN_WINDOWS
     for _, triad in TRIADS:
         at = list(triad)
-        differences = [
-            [d for lag in DIFFERENCE_LAGS for d in _differences(rows, c, lag)]
-            for c in at
-        ]
+        lags = DIFFERENCE_LAGS
+        differences = [[d for k in lags for d in _differences(rows, c, k)] for c in at]
         walks = WanderHypotheses(
             walk[at] * unit[at], walk_chance, priors.SINGLE_AXIS_SHARE
         )
@@ -121,7 +117,8 @@ def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
         if few:
             evidence[1, at] = -np.inf
             continue
-        flickers = WanderHypotheses(flicker[at] * unit[at], priors.FLICKER_CHANCE, 0.0)
+        size = priors.FLICKER[at] * unit[at]
+        flickers = WanderHypotheses(size, priors.FLICKER_CHANCE, 0.0)
         out[1, at], evidence[1, at] = flickers.sizes(
             [[(d, d.unit_flicker) for d in of_axis] for of_axis in differences]
         )
@@ -209,14 +206,12 @@ def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
 
 def _flicker_structure(x: Array) -> Array:
     """D of (3) for a = 1: two means x of their lengths apart."""
-    out: Array = (_squared_ln(x + 1) + _squared_ln(x - 1)) / 2 - _squared_ln(x)  # (3)
-    return out
+    return (_squared_ln(x + 1) + _squared_ln(x - 1)) / 2 - _squared_ln(x)  # (3)
 
 
 def _squared_ln(x: Array) -> Array:
     """x^2 ln x; 0 at x = 0."""
-    out: Array = x**2 * np.log(np.maximum(x, 1e-12))
-    return out
+    return x**2 * np.log(np.maximum(x, 1e-12))
 
 
 def _later_half(rows: Rows, ahead: int) -> Index:
@@ -225,5 +220,4 @@ def _later_half(rows: Rows, ahead: int) -> Index:
     at = np.flatnonzero(position[ahead:] == position[:-ahead])
     first = np.searchsorted(position, position[at])
     count = np.searchsorted(position, position[at], side="right") - first
-    out: Index = at[2 * (at - first) >= count - 1]
-    return out
+    return at[2 * (at - first) >= count - 1]

@@ -39,8 +39,7 @@ def triangular_inverse(root: Array) -> Array:
     """
     width = root.shape[-1]
     if width <= UNDIVIDED_SIZE:
-        out: Array = np.linalg.inv(root)
-        return out
+        return np.linalg.inv(root)
     k = width // 2
     out = np.zeros(root.shape)
     out[..., :k, :k] = first = triangular_inverse(root[..., :k, :k])

@@ -73,11 +73,15 @@ class Eliminated:
         places = [int(np.flatnonzero(self.columns == c)[-1]) for c in columns]
         return np.array(places, dtype=np.intp)
 
+    def without(self, columns: Index | list[int]) -> Eliminated:
+        """The set without some columns, the others with the same prior sizes."""
+        kept = ~np.isin(self.columns, columns)
+        return Eliminated.of(self.rows, self.columns[kept], self.prior_sigma[kept])
+
     @cached_property
     def inverse(self) -> Array:
         """Posterior covariance S (I + S G S)^-1 S, (a, a)."""
-        out: Array = self.half.T @ self.half
-        return out
+        return self.half.T @ self.half
 
     def schur_complement(self, columns: Index, typical: Array) -> tuple[Array, Array]:
         """M and T b' of further columns after elimination, in typical sizes."""
@@ -121,10 +125,8 @@ def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
     determined = strength > MIN_EIGENVALUE * np.maximum(
         np.asarray(own)[..., None], 1e-300
     )
-    strength, power = (
-        np.where(determined, strength, 0.0),
-        np.where(determined, power, 0.0),
-    )
+    strength = np.where(determined, strength, 0.0)
+    power = np.where(determined, power, 0.0)
     return gains_from_eigenvalues(strength, power)
 
 

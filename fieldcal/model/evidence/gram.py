@@ -16,9 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,28 +62,19 @@ class Gram:
         index = np.full(len(self.index), -1, dtype=np.intp)
         index[kept] = np.arange(len(kept))
         return replace(
-            self,
-            within=self.within[np.ix_(at, at)],
-            rhs=self.rhs[at],
-            means=self.means[:, :, at],
-            index=index,
-        )
+            self, within=self.within[np.ix_(at, at)], rhs=self.rhs[at],
+            means=self.means[:, :, at], index=index,
+        )  # fmt: skip
 
     def blocks(self, columns: Sequence[Index]) -> list[Array]:
         """Blocks of `within`, which do not depend on the instability."""
         local = [self.index[at] for at in columns]
         return [self.within[at[:, :, None], at[:, None, :]] for at in local]
 
-    def select_windows(self, windows: NDArray[np.bool_], info: Array) -> Gram:
+    def select_windows(self, windows: Mask, info: Array) -> Gram:
         """Some windows, with other information on their means."""
-        parts = (
-            "means",
-            "residual",
-            "shared",
-            "free_rotations",
-            "kind",
-            "closure_errors",
-        )
+        parts = ("means", "residual", "shared", "free_rotations", "kind",
+                 "closure_errors")  # fmt: skip
         kept = {name: getattr(self, name)[windows] for name in parts}
         return replace(self, info=info[windows], **kept)
 
@@ -172,8 +162,7 @@ class WeightedGram:
     def rhs(self, columns: Index | None) -> Array:
         """Phi^T R^-1 (y - h) of some columns, or of all."""
         at = slice(None) if columns is None else self.gram.index[columns]
-        out: Array = self.gram.rhs[at] + self.white[:, at].T @ self.residual
-        return out
+        return self.gram.rhs[at] + self.white[:, at].T @ self.residual
 
     def diagonals(self, blocks: Sequence[Index]) -> list[Array]:
         """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each."""

@@ -22,12 +22,12 @@ is (1) of `eliminated`. After the elimination of the set, the further columns ha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.gram import Gram, WeightedGram
 
@@ -35,8 +35,7 @@ MAX_NUMBERS = 4_000_000
 """Largest number of table elements that are calculated at once: 30 MB."""
 
 
-@dataclass(frozen=True, slots=True)
-class InstabilityScan:
+class InstabilityScan(NamedTuple):
     """A set, eliminated at each of n instabilities.
 
     Attributes
@@ -84,7 +83,7 @@ def scan_instabilities(
         taus[0]
     )
     common = _joint_gram(still, all_columns)
-    windows: NDArray[np.bool_] = np.any(moved, axis=1)
+    windows: Mask = np.any(moved, axis=1)
     reduced = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
     table = np.append(
         reduced.means[:, :, reduced.index[all_columns]],
@@ -101,22 +100,18 @@ def scan_instabilities(
         total = common + np.swapaxes(white, 1, 2) @ white  # (1)
         eliminated = _eliminate(total, sizes[part], further.shape)
         score = eliminated.score - 0.5 * (log_det + still.log_det)
-        parts.append(replace(eliminated, score=score))
-    names = InstabilityScan.__slots__
-    return InstabilityScan(
-        *(np.concatenate([getattr(p, n) for p in parts]) for n in names)
-    )
+        parts.append(eliminated._replace(score=score))
+    return InstabilityScan(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> NDArray[np.bool_]:
+def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> Mask:
     """Means whose noise depends on instabilities of some kinds, (p, 6)."""
     own = np.isin(gram.kind, kinds)
     if bent := [k for k in kinds if k < gram.closure_errors.shape[2]]:
         own |= gram.closure_errors[:, :, bent].any(axis=2)
     turned = gram.free_rotations.any(axis=2)
     own |= turned & np.any(turned & own, axis=1)[:, None]
-    out: NDArray[np.bool_] = own & (gram.info > 0)
-    return out
+    return own & (gram.info > 0)
 
 
 def _joint_gram(rows: WeightedGram, columns: Index) -> Array:

@@ -186,8 +186,7 @@ class Sets:
 
     def instability_sigma(self, instability: Sequence[int]) -> Array:
         """Standard deviation (7,) of instabilities, from indices in `priors.SIZES`."""
-        sigma: Array = priors.SIZES[list(instability)] * self.typical_instability
-        return sigma
+        return priors.SIZES[list(instability)] * self.typical_instability
 
     def instability_log_prior(self, instability: Sequence[int] | Array) -> Any:
         """Log prior of instabilities (..., 7), as `sizing.instability_log_prior`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.samples import Index
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sizing import LOG_DENSITY, LOG_SIZE_STEP, gain_terms
@@ -20,9 +20,7 @@ MIN_SIZE_INFORMATION = 0.1
 def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
     """Most probable size of a group, and standard uncertainty of its logarithm.
 
-    `at` are the indices of its columns in the state, `v` its size there. The
-    information on ln v is twice the sum of the squares of the shares lambda v^2 /
-    (1 + lambda v^2), lambda of (2) of `eliminated`.
+    `at` are the indices of its columns in the state, `v` its size there.
     """
     strength, power = gain_terms(state, at, v)
     near = v * np.exp(np.linspace(-LOG_SIZE_STEP, LOG_SIZE_STEP, REFINED_SIZES))
@@ -30,8 +28,8 @@ def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, f
     best = float(
         near[np.argmax(gains_from_eigenvalues(strength, power, near) + before)]
     )
-    share = best**2 * strength / (1 + best**2 * strength)
-    return best, float(np.maximum(2 * (share**2).sum(), MIN_SIZE_INFORMATION) ** -0.5)
+    info = np.maximum(_information(strength, best), MIN_SIZE_INFORMATION)
+    return best, float(info**-0.5)
 
 
 def most_probable_axis_size(
@@ -50,7 +48,15 @@ def most_probable_axis_size(
         np.argmax(gains_from_eigenvalues(strength, power, near) - 0.5 * distance**2)
     )
     best = float(near[top])
-    share = best**2 * strength / (1 + best**2 * strength)
     prior_info = priors.AXES_LOG_SPREAD**-2
-    info = prior_info + 2 * float((share**2).sum())
+    info = prior_info + _information(strength, best)
     return best, float(np.hypot(info**-0.5, prior_info / info * middle_sigma))
+
+
+def _information(strength: Array, v: float) -> float:
+    """Information on ln v: twice the sum of squares of lambda v^2 / (1 + lambda v^2).
+
+    `strength` (k,) are lambda of (2) of `eliminated`.
+    """
+    share = v**2 * strength / (1 + v**2 * strength)
+    return 2 * float((share**2).sum())

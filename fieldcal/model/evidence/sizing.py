@@ -142,10 +142,8 @@ class Sizing:
         start: Sizes | None,
     ) -> None:
         self.groups: list[Group] = [*dictionary.always, *(g for _, g in members)]
-        self.count, self.typical_instability = (
-            len(dictionary.always),
-            typical_instability,
-        )
+        self.count = len(dictionary.always)
+        self.typical_instability = typical_instability
         begin = start or Sizes(
             (UNIT_INDEX,) * self.count, (UNIT_INDEX,) * 7, (UNIT_INDEX,) * len(members)
         )
@@ -198,12 +196,7 @@ class Sizing:
     def _prior_sigma(self) -> Array:
         parts = []
         for group, size in zip(self.groups, self.sizes, strict=True):
-            free = float(priors.SIZES[size])
-            parts.append(
-                group.prior_sigma(
-                    free if group.fixed_size is None else group.fixed_size
-                )
-            )
+            parts.append(group.own_sigma(float(priors.SIZES[size])))
         return np.concatenate([np.empty(0), *parts])
 
     def _maximise_groups(self, free: Sequence[int]) -> list[Array]:
@@ -233,13 +226,8 @@ class Sizing:
             first = np.array([self.places[i].start for i in alike])
             at = first[:, None] + np.arange(width)
             v = priors.SIZES[[self.sizes[i] for i in alike]]
-            out.update(
-                zip(
-                    alike,
-                    gains_from_eigenvalues(*gain_terms(state, at, v)),
-                    strict=True,
-                )
-            )
+            gains = gains_from_eigenvalues(*gain_terms(state, at, v))
+            out |= dict(zip(alike, gains, strict=True))
         return out
 
     def _maximise_triad(self, channels: Sequence[int]) -> list[Array]:

@@ -83,6 +83,6 @@ def _added(fitted: Set, group: Group) -> Iterator[tuple[int, int, float]]:
     for name, (cause, gone, sign) in group.effect.turned_by.items():
         for _, there in fitted.members:
             if there.effect is not None and there.cause == cause:
-                known = [there.effect.params[j].name for j in there.params]
-                at = [c for n, c in zip(known, there.columns, strict=True) if n == gone]
+                pairs = zip(there.names, there.columns, strict=True)
+                at = [c for n, c in pairs if n == gone]
                 yield from ((names.index(name), int(c), sign) for c in at)

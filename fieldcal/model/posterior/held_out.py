@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
@@ -36,13 +35,9 @@ distance from the best, ln."""
 
 
 class HeldOut:
-    """Predicts each part of a session from the others.
+    """Predicts each part of a session from the others, with the columns of `sets`.
 
-    Parameters
-    ----------
-    fitted : the best set
-    sets : sets whose columns are used
-
+    `fitted` is the best set.
     """
 
     def __init__(self, fitted: FittedSet, sets: Sequence[Set]) -> None:
@@ -50,7 +45,7 @@ class HeldOut:
         self.fold = folds(fitted.dictionary)
         columns = _columns(self.dictionary, sets) | (fitted.values != 0)
         self.columns = np.flatnonzero(columns)
-        self.linear = [_select_columns(part, columns) for part in fitted.linear]
+        self.linear = [part.select_columns(columns) for part in fitted.linear]
         self._rest: dict[int, Sets | None] = {}
 
     def residual(self, sets: Sequence[Set]) -> Array:
@@ -64,18 +59,14 @@ class HeldOut:
                 continue
             left = self.fold == i
             chosen = max(
-                (rest.evaluate(s.members, s.sizes) for s in sets),
-                key=lambda s: s.score,
+                (rest.evaluate(s.members, s.sizes) for s in sets), key=lambda s: s.score
             )
-            step = (
-                self.fitted.values
-                - estimates_by_column(chosen.state, d)
-                + _random_estimate(chosen, d)
-            )
+            estimate = estimates_by_column(chosen.state, d)
+            step = self.fitted.values - estimate + _random_estimate(chosen, d)
             places = d.window_positions[np.isin(d.window_positions, d.x.position[left])]
             if len(d.window_positions) >= MIN_WINDOWS:
                 step[d.rotations_of(places)] = 0.0
-            rows = [_select_rows(p, left[p.rows]) for p in self.linear]
+            rows = [p.select_rows(left[p.rows]) for p in self.linear]
             _predict(out, rows, step, chosen, d)
         return out
 
@@ -129,7 +120,7 @@ class HeldOut:
         """Sets over the rows without a part; None if a channel has no others."""
         if i not in self._rest:
             left = self.fold == i
-            rest = [_select_rows(part, ~left[part.rows]) for part in self.linear]
+            rest = [part.select_rows(~left[part.rows]) for part in self.linear]
             values, d = self.fitted.values, self.dictionary
             determined = all(len(part.white) for part in rest)
             rows = gram(rest, d, values, (), self.columns) if determined else None
@@ -154,7 +145,7 @@ def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Arr
     """Whitened held-out residuals of turns, from the windows and the other turns."""
     d, out = fitted.dictionary, []
     columns = _columns(d, [fitted.set]) | (fitted.values != 0)
-    linear = [_select_columns(part, columns) for part in fitted.linear]
+    linear = [part.select_columns(columns) for part in fitted.linear]
     for i in range(min(len(turns), MAX_FOLDS)):
         left = turns[i::MAX_FOLDS]
         kept = [t for t in turns if all(t is not other for other in left)]
@@ -171,12 +162,11 @@ def turn_residual(turn: TurnRows, estimate: Array) -> Array:
     return np.concatenate([closure, turn.way - turn.way_design @ values])
 
 
-def folds(d: Dictionary) -> NDArray[np.intp]:
+def folds(d: Dictionary) -> Index:
     """Number of the part that each row is left out in, (n,)."""
     index = np.searchsorted(d.window_positions, d.x.position)
     if len(d.window_positions) >= MIN_WINDOWS:
-        out: NDArray[np.intp] = (index % MAX_FOLDS).astype(np.intp)
-        return out
+        return (index % MAX_FOLDS).astype(np.intp)
     out = np.zeros(len(index), dtype=np.intp)
     for p in d.window_positions:
         for i, part in enumerate(
@@ -192,28 +182,13 @@ def _residual_square(eliminated: Eliminated) -> float:
     return eliminated.rows.square - float(rhs @ eliminated.estimate)
 
 
-def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
+def _columns(d: Dictionary, sets: Sequence[Set]) -> Mask:
     """Columns of some sets and all rotations of positions, (all,)."""
     out = np.zeros(d.width, dtype=bool)
     for candidate in sets:
         out[candidate.state.columns] = True
     out[d.rotations] = True
     return out
-
-
-def _select_columns(part: LinearRows, columns: NDArray[np.bool_]) -> LinearRows:
-    kept = columns[part.columns]
-    return LinearRows(
-        part.channel, part.rows, part.window, part.weight,
-        part.columns[kept], part.design[:, kept], part.white,
-    )  # fmt: skip
-
-
-def _select_rows(part: LinearRows, kept: NDArray[np.bool_]) -> LinearRows:
-    return LinearRows(
-        part.channel, part.rows[kept], part.window[kept], part.weight[kept],
-        part.columns, part.design[kept], part.white[kept],
-    )  # fmt: skip
 
 
 def _predict(
@@ -263,9 +238,7 @@ def _angle_sigmas(chosen: Set, d: Dictionary) -> Array:
     return only
 
 
-def _angles(
-    left: Sequence[LinearRows], d: Dictionary
-) -> Iterator[tuple[int, NDArray[np.intp]]]:
+def _angles(left: Sequence[LinearRows], d: Dictionary) -> Iterator[tuple[int, Index]]:
     """Numbers of the held-out windows, with the columns of their rotations."""
     for j in np.unique(np.concatenate([p.window for p in left])).tolist():
         yield j, d.rotations_of(d.window_positions[j])

@@ -25,6 +25,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.unknown_causes import typical_unknown_sizes
 from fieldcal.model.evidence.eliminated import evidence_gains
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.levels import InstabilityScan, scan_instabilities
@@ -125,19 +126,17 @@ class Mixing:
         given: bool = True,
         doubt: bool = True,
     ) -> None:
-        self.dictionary, self.fitted, self.typical_instability = (
-            dictionary,
-            fitted,
-            typical_instability,
-        )
+        self.dictionary = dictionary
+        self.fitted = fitted
+        self.typical_instability = typical_instability
         self.density = GIVEN_SET_LOG_DENSITY if given else INSTABILITY_LOG_DENSITY
         sizing = Sizing(
             dictionary, gram, typical_instability, fitted.members, fitted.sizes
         )
         self.columns, self.prior_sigma = sizing.columns, fitted.state.prior_sigma
-        self.doubted = self._doubted_windows() if given and doubt else []
-        more = [at for _, at in self.doubted]
-        self.gram = gram.select_columns(np.concatenate([self.columns, *more]))
+        self.doubted = self._offsets_of_windows() if given and doubt else NONE
+        wanted = np.append(self.columns, self.doubted)
+        self.gram = gram.select_columns(wanted)
         self.bad = np.zeros(len(dictionary.window_positions))
 
     def run(self) -> Mixture:
@@ -146,10 +145,8 @@ class Mixing:
         best = sum(max(h.score for h in hypotheses) for hypotheses in lists)
         near = [parts for parts in product(*lists)
                 if sum(h.score for h in parts) > best - MAX_LOG_DISTANCE]  # fmt: skip
-        tau = (
-            priors.SIZES[[self._sizes_of(parts) for parts in near]]
-            * self.typical_instability
-        )
+        sizes = priors.SIZES[[self._sizes_of(parts) for parts in near]]
+        tau = sizes * self.typical_instability
         score, means, covariances = self._combine_exactly(near, tau)
         score += instability_log_prior(
             self.fitted.sizes.instability, self.typical_instability, self.density
@@ -164,15 +161,16 @@ class Mixing:
             self.columns, mean, covariance, self.prior_sigma, self.bad, scatter, total
         )
 
-    def _doubted_windows(self) -> list[tuple[int, Index]]:
-        """Windows that may be bad by the accelerometers, with their columns."""
+    def _offsets_of_windows(self) -> Index:
+        """Columns of the accelerometers' offsets in each window, (w, k).
+
+        Empty for two windows or fewer, which could only contradict each other.
+        """
         d = self.dictionary
-        observed = [c for c in d.observed if c < 3]
-        held = len(d.window_positions)
-        if held <= 2 or not observed:
-            return []
-        every = np.array(observed) * held + d.windows
-        return [(i, (every + i).astype(np.intp)) for i in range(held)]
+        observed = [d.window_columns(c) for c in d.observed.tolist() if c < 3]
+        if len(d.window_positions) <= 2 or not observed:
+            return NONE
+        return np.column_stack(observed)
 
     def _triad_hypotheses(self, triad: Sequence[int]) -> list[Hypothesis]:
         """Hypotheses about one triad that count, the other triads fixed."""
@@ -181,7 +179,7 @@ class Mixing:
         if not self.typical_instability[list(triad)].any():
             return [first]
         sizes, log_priors = self._shifted(triad)
-        doubted = self._bad_columns() if triad[0] == 0 and self.doubted else NONE
+        doubted = self.doubted if triad[0] == 0 else NONE
         taus = priors.SIZES[np.array(sizes)] * self.typical_instability
         scan = scan_instabilities(
             self.gram, self.columns, self.prior_sigma, taus, doubted
@@ -207,14 +205,10 @@ class Mixing:
             by_window = np.logaddexp.reduce(with_bad, axis=(0, 2))
             total = np.logaddexp.reduce([*without_bad, *by_window])
             self.bad = np.exp(by_window - total)
-            hypotheses += [
-                Hypothesis(
-                    sizes[n], i, v, float(log_prior[n, v]), float(with_bad[n, i, v])
-                )
-                for n, i, v in np.argwhere(
-                    with_bad > without_bad.max() - MAX_LOG_DISTANCE
-                ).tolist()
-            ]
+            near = np.argwhere(with_bad > without_bad.max() - MAX_LOG_DISTANCE)
+            for n, i, v in near.tolist():
+                prior, score = float(log_prior[n, v]), float(with_bad[n, i, v])
+                hypotheses.append(Hypothesis(sizes[n], i, v, prior, score))
         best = max(h.score for h in hypotheses)
         return [h for h in hypotheses if h.score > best - MAX_LOG_DISTANCE]
 
@@ -247,13 +241,9 @@ class Mixing:
         typical = float(self.typical_instability[list(triad)].max())
         return int(np.searchsorted(priors.SIZES * typical, MIN_INSTABILITY * noise))
 
-    def _bad_columns(self) -> Index:
-        """Columns of the windows that may be bad, (w, k)."""
-        return np.array([at for _, at in self.doubted])
-
     def _bad_window_gains(self, scan: InstabilityScan) -> Array:
         """Gains if a window is bad, by instability, window and size, (n, w, v)."""
-        typical = self._typical(self.doubted[0][1])
+        typical = self._typical_offset
         inner = scan.inner * typical * typical[:, None]
         own = (scan.diagonal * typical**2).max(axis=-1)
         return evidence_gains(inner, scan.rhs * typical, own)
@@ -279,25 +269,24 @@ class Mixing:
         window = np.array([acc.window for acc, *_ in near])
         for bad in np.unique(window).tolist():
             rows = np.flatnonzero(window == bad)
-            columns, prior_sigma = (
-                self.columns,
-                np.tile(self.prior_sigma, (len(rows), 1)),
-            )
+            columns = self.columns
+            prior_sigma = np.tile(self.prior_sigma, (len(rows), 1))
             if bad >= 0:
-                at = dict(self.doubted)[bad]
                 off = priors.SIZES[[near[h][0].size for h in rows.tolist()]]
-                columns = np.append(columns, at)
-                prior_sigma = np.hstack([prior_sigma, np.outer(off, self._typical(at))])
+                columns = np.append(columns, self.doubted[bad])
+                offset = np.outer(off, self._typical_offset)
+                prior_sigma = np.hstack([prior_sigma, offset])
             scan = scan_instabilities(self.gram, columns, prior_sigma, tau[rows], NONE)
             score[rows] += scan.score
             means, covariances = scan.posterior()
             mean[rows], covariance[rows] = means[:, :k], covariances[:, :k, :k]
         return score, mean, covariance
 
-    def _typical(self, at: Index) -> Array:
-        unit = self.dictionary.unit[:3][[c for c in self.dictionary.observed if c < 3]]
-        out: Array = priors.UNKNOWN_ACC * unit * np.ones(len(at))
-        return out
+    @property
+    def _typical_offset(self) -> Array:
+        """Typical offset of each accelerometer in a bad window, (k,), outputs."""
+        d = self.dictionary
+        return typical_unknown_sizes(d)[[c for c in d.observed if c < 3]]
 
 
 def covariance_of_means(means: Array, weight: Array) -> Array:
@@ -306,5 +295,4 @@ def covariance_of_means(means: Array, weight: Array) -> Array:
     It is added to the mean of their covariances (law of total covariance).
     """
     off = means - weight @ means
-    out: Array = (weight[:, None] * off).T @ off
-    return out
+    return (weight[:, None] * off).T @ off

@@ -21,6 +21,7 @@ tutorial, 1999, (1) to (3); for (2), the inverse of a partitioned matrix.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -29,17 +30,41 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.eliminated import Eliminated
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.evidence.unfitted_groups import groups_not_in
-from fieldcal.model.posterior.common_axes import (
-    group_in,
-    parameter_rows,
-    pick_columns,
+from fieldcal.model.posterior.common_axes import group_in, parameter_rows, pick_columns
+from fieldcal.model.posterior.mixture import (
+    MAX_LOG_DISTANCE,
+    Mixing,
+    covariance_of_means,
 )
-from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE, covariance_of_means
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.size_average import average_over_sizes
+from fieldcal.model.search.set_at_instability import with_typical_calibration
+
+
+def average_over_sizes(sets: Sets, fitted: Set) -> Set:
+    """A set as it is reported: with mean and covariance of the mixture in its state.
+
+    The most probable size may underestimate the uncertainty. If the rows hardly
+    determine a calibration parameter, its most probable size is the smallest of the
+    grid, and the most probable instability in few windows is often zero. Therefore
+    calibration parameters have the prior of devices of their grade, and the estimate is
+    the mean over all instabilities (`mixture`).
+    """
+    prior_sigma, _ = with_typical_calibration(sets.dictionary, fitted)
+    columns = fitted.state.columns
+    state = Eliminated.of(fitted.state.rows, columns, prior_sigma)
+    widened = replace(fitted, state=state)
+    if len(np.unique(columns)) < len(columns) or not len(columns):
+        return widened  # a column of two groups has one estimate for each
+    mixture = Mixing(
+        sets.dictionary, sets.gram, widened, sets.typical_instability, False
+    ).run()
+    half = np.linalg.cholesky(mixture.covariance).T
+    state = replace(state, half=half, estimate=mixture.mean)
+    return replace(fitted, state=state)
+
 
 Pick = Callable[[Set], Array]
 """Rows (k, a) that give k quantities from the a columns of a set; a quantity that the
@@ -52,12 +77,8 @@ Estimate = tuple[Array, Array]
 class ModelAverage:
     """Averages over the sets of a posterior.
 
-    Parameters
-    ----------
-    posterior : sets and their probabilities
-    best : sets that replace the best one, with equal weights: its estimate averaged
-        over sizes, and at other time constants
-
+    The sets `best` replace the best one, with equal weights: its estimate averaged over
+    sizes, and at other time constants.
     """
 
     def __init__(self, posterior: Posterior, best: Sequence[Set]) -> None:

@@ -22,7 +22,7 @@ from fieldcal.model.causes.cause import BOTH, Group, triads_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
-from fieldcal.model.search.offer import Offer
+from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.variations import ALTERNATIVE_MARGIN, visit_variations
 
@@ -62,12 +62,7 @@ class ProbableCause:
 class Posterior:
     """Probabilities of causes, from the sets that a search visited.
 
-    Parameters
-    ----------
-    search : with the sets that it visited
-    best : the best of them
-    refined : returns a set with refined time constants
-
+    `best` is the best of them; `refined` returns a set with refined time constants.
     """
 
     def __init__(
@@ -240,13 +235,12 @@ class Posterior:
     def probability(self, names: Iterable[str], triads: frozenset[str] = BOTH) -> float:
         """Probability that one of some causes is present on one of some triads."""
         wanted = set(names)
-        return _sum_of_shares(
-            w
-            for s, w in self.weights
-            if any(
-                c.name in wanted and triads_of(c.part) & triads for c, _ in s.members
-            )
-        )
+
+        def has_one(some: Set) -> bool:
+            named = (c for c, _ in some.members if c.name in wanted)
+            return any(triads_of(c.part) & triads for c in named)
+
+        return _sum_of_shares(w for s, w in self.weights if has_one(s))
 
     def probable_causes(self) -> list[ProbableCause]:
         """Causes of the best set that are likelier present than absent."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.size_average import average_over_sizes
+from fieldcal.model.posterior.model_average import average_over_sizes
 from fieldcal.model.search.inference import InferenceResult
 
 MAX_LOG_SIGMA = 1.0

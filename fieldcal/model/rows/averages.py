@@ -8,10 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.positions import alpha_beta_angles, attitude_sigmas, gamma_angles
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.block_means import block_means, masked
 from fieldcal.model.rows.orientation import (
@@ -58,19 +57,25 @@ class Rows:
     session_error: Array = field(default_factory=lambda: np.zeros(6))
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Mask:
         """Means that can be used, (n, 6)."""
         return np.isfinite(self.y) & np.isfinite(self.sd)
 
-    def without(self, left: NDArray[np.bool_]) -> Rows:
+    @property
+    def error_by_window(self) -> Array:
+        """Error that all rows of a window share, of each position held, (p, 6)."""
+        first = np.unique(self.x.position, return_index=True)[1]
+        return self.window_error[first]
+
+    def without(self, left: Mask) -> Rows:
         """The rows with those marked in `left` (n,) made unusable."""
         return replace(self, sd=np.where(left[:, None], np.nan, self.sd))
 
 
 def average_rows(
     source: RowSource,
-    bound: NDArray[np.intp],
-    position: NDArray[np.intp],
+    bound: Index,
+    position: Index,
     level: Array,
     noise: Array,
     variance: Array,
@@ -102,7 +107,7 @@ def average_rows(
     return Rows(x, y, sd, np.zeros_like(sd), length, noise, span, still)
 
 
-def _lacks_direction(x: Experience, y: Array) -> NDArray[np.bool_]:
+def _lacks_direction(x: Experience, y: Array) -> Mask:
     """Rows of free positions in which an accelerometer was never measured, (n,).
 
     The other two do not tell where the force points.
@@ -116,7 +121,7 @@ def _lacks_direction(x: Experience, y: Array) -> NDArray[np.bool_]:
 
 def _experience(
     source: RowSource,
-    position: NDArray[np.intp],
+    position: Index,
     y: Array,
     t: Array,
     length: Array,

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.positions import table_rates
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
@@ -122,15 +121,13 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
     noise = [w.noise * w.length for waves in waves_by_position.values() for w in waves]
     steady = _without_sway(felt, windows, waves_by_position)
     return BaseSway(
-        block.with_six(steady * unit),
-        np.array(left) * unit**2,
+        block.with_six(steady * unit), np.array(left) * unit**2,
         np.sqrt(np.mean(noise, axis=0) * sampling_rate(block)) * np.abs(unit),
-        float(np.sqrt((amplitude**2).mean())),
-        float(hz.mean()),
+        float(np.sqrt((amplitude**2).mean())), float(hz.mean()),
         (float(amplitude.std() / root), float(hz.std() / root)),
         max(needed_seconds(w) for waves in waves_by_position.values() for w in waves),
         0.0 if gyroscopes.any() else lost,
-    )
+    )  # fmt: skip
 
 
 def _unseen_sway_variance(size: Array, t: Array) -> Array:
@@ -158,9 +155,7 @@ def _known_positions(about: Description) -> list[int]:
 
 
 def _without_sway(
-    block: Block,
-    windows: NDArray[np.intp],
-    waves_by_position: dict[int, list[SwayWaves]],
+    block: Block, windows: Index, waves_by_position: dict[int, list[SwayWaves]]
 ) -> Array:
     """Samples (n, 6), SI, corrected to a base at rest."""
     six, rate = block.six, sampling_rate(block)
@@ -179,10 +174,8 @@ def _without_sway(
             turned = waves_by_position[p][-1].turn_angle(block.t[end : end + 1])[0]
             six[end + few : end + 2 * few, 3:] += turned * rate / few
         if q in waves_by_position:
-            waves, last = (
-                waves_by_position[q][0],
-                start - 1 - round(WINDOW_MARGIN_S * rate),
-            )
+            waves = waves_by_position[q][0]
+            last = start - 1 - round(WINDOW_MARGIN_S * rate)
             # the rate falls to rest from this sample to the next one
             turned = waves.turn_angle(block.t[last : last + 2].mean(keepdims=True))[0]
             six[last + 1 : start, 3:] -= waves.outputs(block.t[last + 1 : start])[:, 3:]

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index, Mask
 
 
-def masked(block: Block, usable: NDArray[np.bool_]) -> Block:
+def masked(block: Block, usable: Mask) -> Block:
     """Samples with nan for those that may not be used; the block itself if all may."""
     if usable.all():
         return block
@@ -22,18 +21,14 @@ def masked(block: Block, usable: NDArray[np.bool_]) -> Block:
     return replace(block, **new) if new else block
 
 
-def block_means(
-    block: Block, bound: NDArray[np.intp]
-) -> tuple[Array, NDArray[np.intp]]:
+def block_means(block: Block, bound: Index) -> tuple[Array, Index]:
     """Means between bounds, (n, 6), and how many samples are in each, (n, 6)."""
     parts = [_triad_means(triad, bound) for triad in (block.acc, block.gyr)]
     mean, count = (np.hstack(both) for both in zip(*parts, strict=True))
     return mean, count
 
 
-def _triad_means(
-    triad: Array, bound: NDArray[np.intp]
-) -> tuple[Array, NDArray[np.intp]]:
+def _triad_means(triad: Array, bound: Index) -> tuple[Array, Index]:
     centre = np.nan_to_num(_middle(triad[bound[0, 0] : bound[0, 1]]))
     mean, count = np.empty((len(bound), 3)), np.empty((len(bound), 3), dtype=np.intp)
     # window by window: what is taken at a time stays small

@@ -110,14 +110,9 @@ class Bands:
         shape = _smooth(
             np.log(np.maximum(even, MIN_POWER)), free.sum(axis=0), apart, None
         )
-        return [
-            self._with_mean_level(
-                _smooth(channel_raw, channel_free, apart, shape + mean_level)
-            )
-            for channel_raw, channel_free, mean_level in zip(
-                raw, free, loud, strict=True
-            )
-        ]
+        channels = zip(raw, free, loud, strict=True)
+        levels = [_smooth(own, dof, apart, shape + mean) for own, dof, mean in channels]
+        return [self._with_mean_level(level) for level in levels]
 
     def _with_mean_level(self, level: Array) -> Array:
         """Levels with that of the mean before them."""
@@ -152,5 +147,4 @@ def _smooth(raw: Array, free: Array, apart: Array, about: Array | None) -> Array
         level = level - step
         if np.abs(step).max() < CONVERGED:
             break
-    out: Array = level + np.diag(np.linalg.inv(bend)) / 2
-    return out
+    return level + np.diag(np.linalg.inv(bend)) / 2

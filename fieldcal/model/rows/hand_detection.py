@@ -15,9 +15,8 @@ hand the direction of the force varies beyond their noise, on a table it does no
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import GYR, Array
+from fieldcal.core.samples import GYR, Array, Mask
 from fieldcal.model.rows.averages import Rows
 from fieldcal.windows.noise import is_to_and_fro, quickest_noise
 
@@ -38,9 +37,7 @@ LYING_NOISE_RATIO = 3.0
 recordings 2 at most on a table, 4 to 60 in a hand."""
 
 
-def trembling_windows(
-    rows: Rows, pieces: list[Array], rate: float
-) -> NDArray[np.bool_]:
+def trembling_windows(rows: Rows, pieces: list[Array], rate: float) -> Mask:
     """Windows in which a hand moves the device, while it rests in others, (k,).
 
     `pieces` are the (n_i, 6) samples of each, nan where missing, at `rate` Hz.
@@ -52,9 +49,7 @@ def trembling_windows(
     if not known.any():
         return np.zeros(len(pieces), dtype=bool)
     sensors = np.quantile(shown[:, known], MIN_QUIET_SHARE, axis=0)
-    apart: NDArray[np.bool_] = (shown[:, known] / sensors).mean(
-        axis=1
-    ) > LYING_NOISE_RATIO
+    apart: Mask = (shown[:, known] / sensors).mean(axis=1) > LYING_NOISE_RATIO
     return apart
 
 
@@ -104,8 +99,7 @@ def noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array 
     )
     loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
     quiet = np.argsort(loud)[: max(round(MIN_QUIET_SHARE * len(pieces)), 1)]
-    beside: Array = np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
-    return beside
+    return np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
 
 
 def tremor_rms(values: Array, length: float, white: Array) -> Array:

@@ -48,9 +48,8 @@ from fieldcal.model.rows.hand_drift import (
     drift_factor,
     force_turn_rate,
 )
-from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.noise import rounding_noise
-from fieldcal.model.rows.reduce import reduce_to_rows
+from fieldcal.model.rows.reduce import median_sigma, reduce_to_rows
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
 
@@ -68,10 +67,8 @@ def rows_of_recording(source: RowSource) -> Rows:
     block = masked(source.block, source.usable)
     six = block.six
     pieces = [six[a:b] for a, b in bound]
-    angle, noise = (
-        force_wander_angle(rows),
-        noise_beside_tremor(rows, pieces, rounding_noise(block, bound)),
-    )
+    angle = force_wander_angle(rows)
+    noise = noise_beside_tremor(rows, pieces, rounding_noise(block, bound))
     if angle or noise is not None:
         in_hand = _add_hand_motion(
             source, reduce_to_rows(source, whole=True, level=noise), angle
@@ -95,12 +92,8 @@ def _add_hand_motion(
 ) -> Rows:
     """Add the errors of the means by a hand's motion to rows of whole windows.
 
-    Parameters
-    ----------
-    source, rows : the samples and their rows
-    angle : least rms angle by which the hand turns the force, rad
-    held : (k,) the rows of windows in a hand; all of them if None
-
+    `angle` is the least rms angle by which the hand turns the force, rad; `held` (k,)
+    are the rows of windows in a hand, all of them if None.
     """
     held = np.arange(len(rows.x)) if held is None else held
     turned, pushed, turns = _motion_in_hand(source, rows, held)
@@ -172,5 +165,4 @@ def turned_force(force: Array, angle: Array) -> Array:
     `angle` is the standard deviation about each, (3,) rad.
     """
     across = np.cross(np.eye(3), force) * angle[:, None]
-    out: Array = across.T @ across
-    return out
+    return across.T @ across

@@ -12,7 +12,7 @@ from scipy.interpolate import PPoly
 from fieldcal.core.samples import Array
 
 RESTART_INTERVALS = 3.5
-"""Intervals between knots from which there is a pause."""
+"""Intervals between knots, or samples, from which there is a pause."""
 
 
 def even_times(t: Array, step: float) -> Array:

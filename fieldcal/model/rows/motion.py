@@ -26,12 +26,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import dct, idct, prev_fast_len
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import ACC, GYR, Array, Block, Index
-from fieldcal.model.rows.reference import GAP_INTERVALS, MIN_CHANNEL_SAMPLES, Reference
+from fieldcal.core.samples import ACC, GYR, Array, Block, Index, Mask
+from fieldcal.model.rows.knots import RESTART_INTERVALS
+from fieldcal.model.rows.reference import MIN_CHANNEL_SAMPLES, Reference
 from fieldcal.model.rows.response import Response
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
@@ -71,8 +71,7 @@ class Alignment:
 
     def reference_time(self, t: Array) -> Array:
         """Instants of the recording by the reference's clock, s."""
-        out: Array = t - self.delay + self.drift * (t - self.middle)  # (1)
-        return out
+        return t - self.delay + self.drift * (t - self.middle)  # (1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +113,7 @@ class MotionRows:
         return len(self.y)
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Mask:
         """Rows with a value, by channel, (n, 6)."""
         return np.isfinite(self.y)
 
@@ -248,11 +247,11 @@ def common_samples(block: Block, reference: Reference) -> Block:
     return kept
 
 
-def _compared_channels(block: Block, reference: Reference) -> NDArray[np.bool_]:
+def _compared_channels(block: Block, reference: Reference) -> Mask:
     """Measured channels of the triads of which the reference has any, (6,)."""
     told = np.repeat(reference.observed.reshape(2, 3).any(axis=1), 3)
     measured = np.isfinite(block.six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
-    compared: NDArray[np.bool_] = told & measured
+    compared: Mask = told & measured
     return compared
 
 
@@ -281,7 +280,7 @@ def rows_in_motion(
     good &= reference.covers(alignment.reference_time(block.t), margin)
     kept = np.flatnonzero(good)
     step = float(np.median(np.diff(block.t)))
-    broken = (np.diff(block.t[kept]) > GAP_INTERVALS * step) | (np.diff(kept) > 1)
+    broken = (np.diff(block.t[kept]) > RESTART_INTERVALS * step) | (np.diff(kept) > 1)
     length = max(int(stretch_s / step / per_row), 1)
     length = prev_fast_len(length, real=True)  # a prime one costs five times as much
     stretches = [

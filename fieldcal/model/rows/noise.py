@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index
 from fieldcal.model.rows.block_means import mean_of_known
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import noise
@@ -25,7 +24,7 @@ from fieldcal.windows.rounding import (
 )
 
 
-def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> ChannelNoise:
+def noise_of(block: Block, windows: Index, rate_hz: float) -> ChannelNoise:
     """Noise of one sample of each output inside windows, (6,)."""
     acc, gyr = (noise.measure_noise(p, rate_hz) for p in _pieces(block, windows))
     return ChannelNoise(
@@ -33,12 +32,12 @@ def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Channel
     )
 
 
-def rounding_noise(block: Block, windows: NDArray[np.intp]) -> Array:
+def rounding_noise(block: Block, windows: Index) -> Array:
     """Standard deviation of rounding alone, from the least change, (6,)."""
     return least_deviation(np.concatenate(quantisation_steps(block, windows)))
 
 
-def rounding_sigma(block: Block, windows: NDArray[np.intp]) -> Array:
+def rounding_sigma(block: Block, windows: Index) -> Array:
     """Standard deviation of each window's mean by rounding of the outputs, (w, 6)."""
     off = []
     steps = quantisation_steps(block, windows)
@@ -46,17 +45,13 @@ def rounding_sigma(block: Block, windows: NDArray[np.intp]) -> Array:
         differences = np.nan_to_num(
             [short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces]
         )
-        off.append(
-            np.maximum(
-                variance_of_mean(step, differences),
-                variance_of_few_values(step, differences),
-            )
-        )
+        few = variance_of_few_values(step, differences)
+        off.append(np.maximum(variance_of_mean(step, differences), few))
     deviation: Array = np.sqrt(np.concatenate(off, axis=1))
     return deviation
 
 
-def shared_rounding_sigma(block: Block, windows: NDArray[np.intp], off: Array) -> Array:
+def shared_rounding_sigma(block: Block, windows: Index, off: Array) -> Array:
     """Part of the errors `off` (w, 6) of `rounding_sigma` that all windows share, (6,).
 
     A gyroscope at rest measures the same in each window. Its rounding error is the same
@@ -79,7 +74,7 @@ def shared_rounding_sigma(block: Block, windows: NDArray[np.intp], off: Array) -
     return out
 
 
-def quantisation_steps(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:
+def quantisation_steps(block: Block, windows: Index) -> tuple[Array, Array]:
     """Quantisation steps of both triads, (3,) each.
 
     Those of outputs that are constant in all windows are found in the whole recording.
@@ -90,7 +85,7 @@ def quantisation_steps(block: Block, windows: NDArray[np.intp]) -> tuple[Array, 
     return held[:3], held[3:]
 
 
-def _pieces(block: Block, windows: NDArray[np.intp]) -> Iterator[list[Array]]:
+def _pieces(block: Block, windows: Index) -> Iterator[list[Array]]:
     """Samples of each window, of the accelerometers and of the gyroscopes."""
     held = [slice(a, b) for a, b in windows if b > a]
     for triad in (block.acc, block.gyr):

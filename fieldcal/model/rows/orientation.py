@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.positions import (
     Position,
@@ -12,13 +11,13 @@ from fieldcal.core.positions import (
     gamma_angles,
     unknown_axis_speeds,
 )
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.block_means import mean_of_known
 from fieldcal.model.rows.turntable import GyroReadings
 from fieldcal.session.description import Description
 
 
-def known_angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Array]:
+def known_angles(about: Description, position: Index) -> tuple[Array, Array]:
     """Both angles of each row, (n,) each, rad; nan where unknown."""
     if not about.positions:
         unknown = np.full(len(position), np.nan)
@@ -27,7 +26,7 @@ def known_angles(about: Description, position: NDArray[np.intp]) -> tuple[Array,
     return alpha[position], beta[position]
 
 
-def known_attitudes(about: Description, position: NDArray[np.intp]) -> dict[str, Array]:
+def known_attitudes(about: Description, position: Index) -> dict[str, Array]:
     """The third turn of each row, how well its position is known, and its speed."""
     if not about.positions:
         return {}
@@ -40,24 +39,20 @@ def known_attitudes(about: Description, position: NDArray[np.intp]) -> dict[str,
     }
 
 
-def gyro_readings(
-    about: Description, position: NDArray[np.intp], gyr: Array
-) -> GyroReadings:
+def gyro_readings(about: Description, position: Index, gyr: Array) -> GyroReadings:
     """Angular rates by the gyroscopes' outputs (n, 3), nominally calibrated."""
     w = (gyr - about.nominal["gyr_bias"]) / about.nominal["gyr_scale"]
     positions = about.positions or (Position("all of it"),) * (int(position.max()) + 1)
     return GyroReadings(positions, position, w, float(np.linalg.norm(about.base_rate)))
 
 
-def force_from_outputs(
-    about: Description, position: NDArray[np.intp], acc: Array
-) -> Array:
+def force_from_outputs(about: Description, position: Index, acc: Array) -> Array:
     """Force of length g along the mean of each position's outputs (n, 3), m/s^2."""
     apart = (acc - about.nominal["acc_bias"]) / about.nominal["acc_scale"]
     return force_along_mean(about.gravity, position, apart)
 
 
-def force_along_mean(gravity: float, position: NDArray[np.intp], f: Array) -> Array:
+def force_along_mean(gravity: float, position: Index, f: Array) -> Array:
     """Force of length g along the mean of each position's force `f`, (n, 3).
 
     The mean is over the rows that an axis was measured in: an axis may lack some.

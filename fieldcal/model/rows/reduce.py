@@ -3,6 +3,10 @@
 Each window is cut into blocks (`window_bounds`), so that a hypothesis costs
 milliseconds however long the recording is. The standard deviation of a mean of n
 white samples of deviation s is s / sqrt(n); s is measured in the recording (`noise`).
+
+A session may hold means alone. Their samples and the turns between them are not
+recorded; each is one row. If no times are stated, all means count as taken at the same
+time, and no effect that depends on time can be found.
 """
 
 from __future__ import annotations
@@ -11,14 +15,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model.rows.averages import Rows, average_rows
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.noise import rounding_sigma, shared_rounding_sigma
 from fieldcal.model.rows.row_source import RowSource
+from fieldcal.model.rows.turntable import unknown_earth_rate
 from fieldcal.model.rows.window_bounds import block_bounds, window_bounds
 from fieldcal.physics.experience import Experience
 from fieldcal.windows.dead_band import dead_bands, error_of_means
@@ -26,7 +29,7 @@ from fieldcal.windows.dead_band import dead_bands, error_of_means
 
 def reduce_to_rows(
     source: RowSource,
-    whole: bool | NDArray[np.bool_] = False,
+    whole: bool | Mask = False,
     level: Array | None = None,
     apart: bool = False,
 ) -> Rows:
@@ -69,18 +72,14 @@ class _CutWindows:
 
     """
 
-    windows: NDArray[np.intp]
-    position: NDArray[np.intp]
-    whole: NDArray[np.bool_]
-    bounds: list[NDArray[np.intp]]
+    windows: Index
+    position: Index
+    whole: Mask
+    bounds: list[Index]
 
     @classmethod
     def of(
-        cls,
-        source: RowSource,
-        block: Block,
-        whole: bool | NDArray[np.bool_],
-        apart: bool,
+        cls, source: RowSource, block: Block, whole: bool | Mask, apart: bool
     ) -> _CutWindows:
         """Cut the windows of `block`, the source's samples that may be used.
 
@@ -117,13 +116,10 @@ def _average_windows(source: RowSource, cut: _CutWindows, level: Array | None) -
     if level is not None:
         noise, levels = level, np.where(cut.whole[:, None], level, levels)
     return average_rows(
-        replace(source, block=shaken.block),
-        np.concatenate(cut.bounds),
-        np.repeat(cut.position, rows),
-        np.repeat(levels, rows, axis=0),
-        noise,
+        replace(source, block=shaken.block), np.concatenate(cut.bounds),
+        np.repeat(cut.position, rows), np.repeat(levels, rows, axis=0), noise,
         np.repeat(shaken.variance, rows, axis=0),
-    )
+    )  # fmt: skip
 
 
 def _with_errors_of_site(
@@ -131,39 +127,26 @@ def _with_errors_of_site(
 ) -> Array:
     """Add what sway and an unknown direction of the Earth's rate do to whole windows.
 
-    Parameters
-    ----------
-    x : inputs of the device in n rows
-    off : (n, 6) standard deviations of the other errors that all rows of a window
-        share, m/s^2 and rad/s
-    turned : whether there is more than one window
-
+    `off` (n, 6) are the standard deviations of the other errors that all rows of a
+    window share; `turned` states that there is more than one window.
     """
     if source.sway_variance is not None:
         off = np.hypot(off, np.sqrt(source.sway_variance[x.position]))
     # the direction of the Earth's rate is unknown in device axes, except in a device
     # that was never turned (bias contains it) or whose gyroscopes measure it
     free = x.earth_unseen & turned
-    earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
+    earth = unknown_earth_rate(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
     return off
 
 
 def _errors_of_values(
-    block: Block, windows: NDArray[np.intp], y: Array, rows: Sequence[int]
+    block: Block, windows: Index, y: Array, rows: Sequence[int]
 ) -> tuple[Array, Array]:
     """Errors by rounding and dead bands, which no average makes smaller.
 
-    Parameters
-    ----------
-    windows, rows : (w, 2) samples of each window, and its number of rows
-    y : (n, 6) means of the rows
-
-    Returns
-    -------
     Standard deviations of what all rows of a window share, (n, 6), and of what all
-    windows share, (6,).
-
+    windows share, (6,). `windows` (w, 2) are samples, `rows` their numbers of rows.
     """
     rounded = rounding_sigma(block, windows)
     alike = shared_rounding_sigma(block, windows, rounded)
@@ -173,3 +156,34 @@ def _errors_of_values(
     # what a band hides of a gyroscope at rest is the same in each window
     alike[3:] = np.hypot(alike[3:], hidden[:, 3:].max(axis=0, initial=0.0))
     return off, alike
+
+
+def median_sigma(sigma: Array) -> Array:
+    """Median of each channel's (p, 6) over the positions that have one, (6,)."""
+    known = [axis[np.isfinite(axis)] for axis in sigma.T]
+    return np.array([np.median(axis) if len(axis) else np.nan for axis in known])
+
+
+def rows_of_means(source: RowSource, sigma: Array) -> Rows:
+    """One row for each position of which there is a mean.
+
+    Parameters
+    ----------
+    source : the means as samples, one in each window
+    sigma : (p, 6) standard deviation of each position's means, m/s^2 and rad/s
+
+    """
+    windows = window_bounds(source.block, source.about)
+    held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 0)
+    level = median_sigma(sigma[held])
+    still = np.zeros((len(held), 3))
+    out = average_rows(source, windows[held], held, sigma[held], level, still)
+    x = out.x
+    if not source.about.means_timed:
+        same = np.zeros(len(held))
+        x = replace(x, t=same, since_start=same)
+    x = replace(x, since_turn=np.full(len(held), np.inf))
+    off = np.zeros_like(out.sd)
+    unknown = ~x.oriented & (len(held) > 1)
+    off[unknown, 3:] = unknown_earth_rate(source.about.nominal["gyr_scale"])
+    return replace(out, x=x, window_error=off)

@@ -12,14 +12,10 @@ from copy import copy
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 
-from fieldcal.core.samples import Array, Block, Index
-from fieldcal.model.rows.knots import even_times, hermite_spline
-
-GAP_INTERVALS = 3.5
-"""Intervals between samples from which there is a gap."""
+from fieldcal.core.samples import Array, Block, Index, Mask
+from fieldcal.model.rows.knots import RESTART_INTERVALS, even_times, hermite_spline
 
 MIN_CHANNEL_SAMPLES = 8
 """Samples of a channel from which a reference has it."""
@@ -52,9 +48,7 @@ class Reference:
             for known, channels in self._by_missing_samples(np.isfinite(six))
         ]
 
-    def _by_missing_samples(
-        self, finite: NDArray[np.bool_]
-    ) -> Iterator[tuple[NDArray[np.bool_], Index]]:
+    def _by_missing_samples(self, finite: Mask) -> Iterator[tuple[Mask, Index]]:
         """Samples (n,), and the channels that it has of which these are known."""
         alike: dict[bytes, list[int]] = {}
         for c in np.flatnonzero(self.observed).tolist():
@@ -109,8 +103,9 @@ class Reference:
 
         return self.filtered_by(mean)
 
-    def covers(self, s: Array, margin: float) -> NDArray[np.bool_]:
+    def covers(self, s: Array, margin: float) -> Mask:
         """Which instants, s, are inside the reference by a margin and in no gap."""
         inside = (s > self.start + margin) & (s < self.end - margin)
         after = np.clip(np.searchsorted(self.t, s), 1, len(self.t) - 1)
-        return inside & (self.t[after] - self.t[after - 1] < GAP_INTERVALS * self.step)
+        apart = self.t[after] - self.t[after - 1]
+        return inside & (apart < RESTART_INTERVALS * self.step)

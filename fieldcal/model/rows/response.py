@@ -86,14 +86,9 @@ class Response:
         bend = partial(second_order_slope, tau=max(abs(second), MIN_SECOND_ORDER_S))
         own = sensed.select_channels(channels)
         return cls(
-            late,
-            tau,
-            second,
-            sensed,
-            own.filtered_by(slope),
-            own.filtered_by(bend),
+            late, tau, second, sensed, own.filtered_by(slope), own.filtered_by(bend),
             channels,
-        )
+        )  # fmt: skip
 
     def step_towards(
         self,

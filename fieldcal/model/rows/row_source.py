@@ -6,9 +6,8 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Mask
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.thermometer import Thermometer
@@ -40,7 +39,7 @@ class RowSource:
 
     block: Block
     about: Description
-    usable: NDArray[np.bool_]
+    usable: Mask
     rest_began: Array
     thermometer: Thermometer
     pace: float = 1.0

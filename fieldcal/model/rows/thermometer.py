@@ -131,11 +131,8 @@ def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:
         if allowed == 0.0:
             measure = best = slope
             error = noise * float(np.sqrt(12 * step / (2 * half) ** 3))
-            allowed = (
-                MAX_RATE_DIFFERENCE * error
-                if error < MAX_RATE_NOISE * float(np.std(slope))
-                else 0.0
-            )
+            if error < MAX_RATE_NOISE * float(np.std(slope)):
+                allowed = MAX_RATE_DIFFERENCE * error
             continue
         if MAD_TO_SIGMA * float(np.median(np.abs(slope - measure))) > allowed:
             break
@@ -201,5 +198,4 @@ def _slope_of_run(t: Array, y: Array, weight: Array, half: float) -> Array:
     left = moments[:, np.add.outer(np.arange(3), np.arange(3))] / scale
     left += RIDGE * left[:, :1, :1] * np.eye(3)
     coefficients = np.linalg.solve(left, right / half ** np.arange(3)[:, None])
-    out: Array = coefficients[:, 1, 0] / half
-    return out
+    return coefficients[:, 1, 0] / half

@@ -29,11 +29,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.positions import Position, table_rates, unknown_axis_speeds
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.block_means import mean_of_known
 from fieldcal.physics.experience import Experience
 
@@ -50,6 +49,15 @@ what is linear about them."""
 
 EARTH_RATE_SIGMAS = 5.0
 """Standard deviations by which something may seem larger than the Earth's rate."""
+
+
+def unknown_earth_rate(scale: Array | Sequence[float]) -> Array:
+    """Error of gyroscopes by the Earth's rate in unknown orientations, (3,) outputs.
+
+    One standard deviation, for scale factors (3,).
+    """
+    size: Array = EARTH_RATE / np.sqrt(3) * np.abs(np.asarray(scale))
+    return size
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +89,7 @@ class GyroReadings:
     """
 
     positions: Sequence[Position]
-    position: NDArray[np.intp]
+    position: Index
     w: Array
     earth: float = 0.0
 
@@ -202,8 +210,7 @@ def fit_rotating_earth_rate(
 def _unseen_rate_covariance(axis: Array, turned: float) -> Array:
     """Covariance of the mean if nothing is subtracted, (2)."""
     size = 2 / 3 * EARTH_RATE**2 * min(0.5, 1 / max(turned, 1e-9) ** 2)
-    across: Array = size * (np.eye(3) - np.outer(axis, axis))
-    return across
+    return size * (np.eye(3) - np.outer(axis, axis))
 
 
 def _unit_vectors(axis: Array, angle: Array) -> Array:

@@ -12,9 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model.rows.noise import noise_of, rounding_noise
 from fieldcal.windows.noise import ChannelNoise, short_lag_noise
 
@@ -56,9 +55,7 @@ class WindowNoise:
     block: Block
 
 
-def measure_window_noise(
-    block: Block, windows: NDArray[np.intp], rate_hz: float
-) -> WindowNoise:
+def measure_window_noise(block: Block, windows: Index, rate_hz: float) -> WindowNoise:
     """Measure the noise of every window.
 
     The usual noise is that of the quiet windows. In others, the smaller of two levels
@@ -83,16 +80,14 @@ def measure_window_noise(
     return WindowNoise(noise, levels, variance, block)
 
 
-def quiet_window_noise(
-    block: Block, windows: NDArray[np.intp], rate_hz: float
-) -> ChannelNoise:
+def quiet_window_noise(block: Block, windows: Index, rate_hz: float) -> ChannelNoise:
     """Noise of one sample in the quiet windows, (6,)."""
     return _compare_windows(block, windows, rate_hz)[0]
 
 
 def _compare_windows(
-    block: Block, windows: NDArray[np.intp], rate_hz: float
-) -> tuple[ChannelNoise, Array, NDArray[np.bool_]]:
+    block: Block, windows: Index, rate_hz: float
+) -> tuple[ChannelNoise, Array, Mask]:
     """Usual noise (6,), excess variance of windows (w, 6), and loud windows (w,)."""
     out = np.empty((len(windows), 6))
     for i, (a, b) in enumerate(windows):
@@ -109,7 +104,7 @@ def _compare_windows(
     low = np.fmax(first, grain)
     margin = NOISIER_SIGNIFICANCE / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
     louder = out > low * np.exp(margin)
-    loud: NDArray[np.bool_] = np.any(louder, axis=1)
+    loud: Mask = np.any(louder, axis=1)
     quiet = ~loud & ~stands.any(axis=1)
     quiet = quiet if quiet.any() else ~loud if not loud.all() else loud
     noise = noise_of(block, windows[quiet], rate_hz)
@@ -120,21 +115,15 @@ def _compare_windows(
     return ChannelNoise(white, quick), more, loud
 
 
-def _never_changes(levels: Array, grain: Array) -> NDArray[np.bool_]:
+def _never_changes(levels: Array, grain: Array) -> Mask:
     """Windows in which an output never changes although its noise exceeds a step.
 
     The output is stuck or saturated there, and has no information on the noise.
-
-    Parameters
-    ----------
-    levels : (w, 6) deviation of one sample in each window
-    grain : (6,) deviation within a step of the grid that outputs lie on
-
+    `levels` (w, 6) are deviations of one sample, `grain` (6,) those within a step.
     """
-    still: NDArray[np.bool_] = levels == 0
+    still: Mask = levels == 0
     usual = [np.median(c[c > 0]) if (c > 0).any() else 0.0 for c in levels.T]
-    out: NDArray[np.bool_] = still & (np.array(usual) > grain)
-    return out
+    return still & (np.array(usual) > grain)
 
 
 def without_lines(piece: Array, rate_hz: float) -> Array:
@@ -145,7 +134,7 @@ def without_lines(piece: Array, rate_hz: float) -> Array:
     >>> bool(np.ptp(without_lines(piece, 100.0)) < 1e-6)
     True
     """
-    known: NDArray[np.bool_] = np.all(np.isfinite(piece), axis=1)
+    known: Mask = np.all(np.isfinite(piece), axis=1)
     t = np.arange(len(piece)) / rate_hz
     out = piece.copy()
     if known.sum() < 64 or len(piece) > MAX_SEARCHED_SAMPLES:
@@ -173,14 +162,13 @@ def _strongest_line_hz(y: Array, rate_hz: float) -> float | None:
     return float(hz[hz >= LOWEST_HZ][at]) if total[at] > LINE_POWER_RATIO else None
 
 
-def _fit_line(t: Array, y: Array, known: NDArray[np.bool_], hz: float) -> Array:
+def _fit_line(t: Array, y: Array, known: Mask, hz: float) -> Array:
     """The line near a frequency, (n, c), its frequency fitted to all outputs.
 
     Each counts by its own noise, which is what the fit leaves of it.
     """
     for _ in range(FREQUENCY_STEPS):
-        design = _waves(t, hz)
-        amplitude = np.linalg.lstsq(design[known], y[known], rcond=None)[0]
+        design, amplitude = _fitted_waves(t, y, known, hz)
         left = (y - design @ amplitude)[known]
         rise = np.column_stack([-design[:, 2], design[:, 1]]) @ amplitude[1:]
         slope = (2 * np.pi * t[:, None] * rise)[known]
@@ -189,12 +177,12 @@ def _fit_line(t: Array, y: Array, known: NDArray[np.bool_], hz: float) -> Array:
         slope, left = slope / noise, left / noise
         step = float((slope * left).sum() / max(float((slope**2).sum()), 1e-300))
         hz += float(np.clip(step, -1 / t[-1], 1 / t[-1]))
-    design = _waves(t, hz)
-    amplitude = np.linalg.lstsq(design[known], y[known], rcond=None)[0]
+    design, amplitude = _fitted_waves(t, y, known, hz)
     return design[:, 1:] @ amplitude[1:]
 
 
-def _waves(t: Array, hz: float) -> Array:
-    """A constant, a cosine and a sine, (n, 3)."""
+def _fitted_waves(t: Array, y: Array, known: Mask, hz: float) -> tuple[Array, Array]:
+    """A constant, a cosine and a sine, (n, 3), and their amplitudes, (3, c)."""
     turned = 2 * np.pi * hz * t
-    return np.column_stack([np.ones_like(t), np.cos(turned), np.sin(turned)])
+    waves = np.column_stack([np.ones_like(t), np.cos(turned), np.sin(turned)])
+    return waves, np.linalg.lstsq(waves[known], y[known], rcond=None)[0]

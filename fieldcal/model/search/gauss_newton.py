@@ -1,6 +1,6 @@
 """The base state at the estimate of a set, by iterated linearisation.
 
-Source: Gauss and Newton.
+It is the nominal state, changed by the set's columns. Source: Gauss and Newton.
 """
 
 from __future__ import annotations
@@ -9,20 +9,58 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Member, Sizes
-from fieldcal.model.search.estimated_state import columns_in_state, state_at_estimate
-from fieldcal.model.state import State
+from fieldcal.model.state import State, Term
+from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import System, gram
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turn
+from fieldcal.physics.effect import Motion, Sensor
+
+
+def state_at_estimate(
+    dictionary: Dictionary, nominal: State, fitted: Set
+) -> tuple[State, Array]:
+    """The state at a set's estimate, and the values of all columns, (k,), in it."""
+    d = dictionary
+    kept = np.zeros(d.width, dtype=bool)
+    kept[columns_in_state(d, fitted.members)] = True
+    if d.unoriented.any():
+        kept[d.rotations] = True
+    values = np.where(kept, estimates_by_column(fitted.state, d), 0.0)
+    measured = 3 * d.position_count if d.attitude >= 0 else 0
+    state = State(
+        nominal.bias + values[d.bias : d.bias + 6],
+        nominal.scale + values[d.scale : d.scale + 6],
+        values[d.rotations].reshape(-1, 2),
+        values[d.earth : d.earth + 3] if d.earth >= 0 else np.zeros(3),
+        (*nominal.terms, *_effect_terms(fitted, values)),
+        values[max(d.attitude, 0) :][:measured].reshape(-1, 3),
+    )
+    return state, values
+
+
+def columns_in_state(dictionary: Dictionary, members: Sequence[Member]) -> Index:
+    """Columns of permanent groups and members whose estimates the state contains."""
+    groups = [*dictionary.always, *(g for _, g in members)]
+    return np.concatenate([g.columns for g in groups if g.in_state])
+
+
+def _effect_terms(fitted: Set, values: Array) -> Iterator[Term]:
+    """Effects of a set with their estimated parameters."""
+    for _, group in fitted.members:
+        if isinstance(group.effect, Motion | Sensor):
+            parameters = np.zeros(len(group.effect.params))
+            parameters[list(group.params)] = values[group.columns]
+            yield Term(group.effect, parameters, group.shape, group.origin)
+
 
 MAX_NEWTON_STEPS = 6
 """Steps of Gauss and Newton for one set."""
@@ -70,7 +108,7 @@ class GaussNewton:
         """Values of columns, padded with zeros for columns that were added since."""
         return np.pad(values, (0, self.dictionary.width - len(values)))
 
-    def wanted_columns(self, members: Sequence[Member]) -> NDArray[np.bool_]:
+    def wanted_columns(self, members: Sequence[Member]) -> Mask:
         """Columns of a set, permanent groups, and rotations of unknown orientations."""
         d = self.dictionary
         wanted = np.zeros(d.width, dtype=bool)
@@ -89,7 +127,7 @@ class GaussNewton:
         return gram(linear, self.dictionary, values, self.turn_rows)
 
     def gram_of(
-        self, linear: Sequence[LinearRows], values: Array, wanted: NDArray[np.bool_]
+        self, linear: Sequence[LinearRows], values: Array, wanted: Mask
     ) -> Gram:
         """Gram matrix of some columns from linearised rows, with the current turns."""
         columns = np.flatnonzero(wanted)
@@ -197,9 +235,7 @@ class GaussNewton:
     @property
     def contradicted_turns(self) -> tuple[tuple[int, int], ...]:
         """Pairs of windows whose attitudes contradict the gyroscopes."""
-        return (
-            () if self.turns is None else tuple(self.turns.tracker.contradicted_turns)
-        )
+        return tuple(self.turns.tracker.contradicted_turns) if self.turns else ()
 
     def turns_at(self, state: State) -> list[Turn]:
         """The turns integrated with a state."""
@@ -209,10 +245,7 @@ class GaussNewton:
         self, turns: Sequence[Turn], state: State, members: Sequence[Member]
     ) -> Iterator[Array]:
         """Contribution of some causes to the outputs in turns, (m + 1, 6) each."""
-        if self.turns is None:
-            return
-        terms = tuple(
-            t for t in state.terms
-            if any(t.effect is g.effect for _, g in members)
-        )  # fmt: skip
-        yield from self.turns.outputs_of_terms(turns, state, terms)
+        effects = [g.effect for _, g in members]
+        terms = [t for t in state.terms if t.effect in effects]
+        if self.turns is not None:
+            yield from self.turns.outputs_of_terms(turns, state, terms)

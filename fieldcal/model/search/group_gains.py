@@ -13,12 +13,14 @@ from hashlib import blake2b
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
+from fieldcal.model.causes.cause import EqualWidthGroups
 from fieldcal.model.evidence.eliminated import evidence_gains
 from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.evidence.sets import Sets
-from fieldcal.model.search.instabilities import InstabilityIndices
-from fieldcal.model.search.set_at_instability import SetAtInstability
+from fieldcal.model.search.set_at_instability import (
+    InstabilityIndices,
+    SetAtInstability,
+)
 
 MIN_CACHED_COLUMNS = 30
 """Number of columns of a group from which its gains are cached."""
@@ -42,13 +44,7 @@ class WeightedColumns:
 
 
 class GroupGains:
-    """Calculates the gains of all groups, and caches what several sets need.
-
-    Parameters
-    ----------
-    sets : evaluates sets, and has the Gram matrix of the rows
-
-    """
+    """Calculates the gains of all groups, and caches what several sets need."""
 
     def __init__(self, sets: Sets) -> None:
         self._sets = sets

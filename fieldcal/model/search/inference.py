@@ -81,13 +81,7 @@ class InferenceResult:
 
 
 class Inference:
-    """The inference of one session.
-
-    Parameters
-    ----------
-    fit : linearises the rows of the session, and fits sets
-
-    """
+    """The inference of one session, whose rows `fit` linearises."""
 
     def __init__(self, fit: GaussNewton) -> None:
         self.fit = fit
@@ -95,11 +89,8 @@ class Inference:
     def run(self, begin: Sequence[Member] | None = None) -> InferenceResult:
         """Search until set and state no longer change.
 
-        Parameters
-        ----------
-        begin : members of any dictionary to start from, instead of the empty set; other
-            starting states and the costly changes of sets are then not tried
-
+        `begin` are members of any dictionary to start from, instead of the empty set;
+        other starting states and the costly changes of sets are then not tried.
         """
         dictionary = self.fit.dictionary
         state, values = self._state_without_causes()

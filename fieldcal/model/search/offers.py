@@ -8,30 +8,111 @@ instability of the other triad is kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.cause import Cause, EqualWidthGroups, Group
 from fieldcal.model.causes.smooth import MAX_COSINES
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, SetKey, Sets, variant_log_priors
-from fieldcal.model.evidence.sizing import LOG_DENSITY, Sizes
+from fieldcal.model.evidence.sizing import LOG_DENSITY, Member, Sizes
 from fieldcal.model.search.group_gains import GroupGains
-from fieldcal.model.search.offer import (
-    BestVariants,
-    Offer,
-    OfferTable,
-    extra_log_odds,
-    ranked_offers,
-)
 from fieldcal.model.search.set_at_instability import (
+    InstabilityIndices,
     SetAtInstability,
     at_tried_instabilities,
     permanent_groups,
 )
+
+BestVariants = dict[Cause, tuple[float, int, int]]
+"""For each cause: log evidence that it adds, indices of its variant and size."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Offer:
+    """A member that may be added to a set.
+
+    Attributes
+    ----------
+    member : cause and variant
+    score : predicted score of the set with it
+    size : index of its most probable size
+    instability : indices of the set's instability with it
+
+    """
+
+    member: Member
+    score: float
+    size: int
+    instability: InstabilityIndices
+
+    def with_all_parameters(self) -> Offer:
+        """The offer with all parameters that its cause has."""
+        cause, group = self.member
+        whole = cause.full_variant(group)
+        return self if whole is group else replace(self, member=(cause, whole))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OfferTable:
+    """Offers to a set at one instability.
+
+    Attributes
+    ----------
+    instability : its indices
+    state, score : of the set at this instability
+    offers : the best first
+
+    """
+
+    instability: InstabilityIndices
+    state: Eliminated
+    score: float
+    offers: list[Offer]
+
+    @classmethod
+    def of(cls, current: Set, level: SetAtInstability, best: BestVariants) -> Self:
+        """Offers of the best variants that a set does not contain, the best first."""
+        offers = ranked_offers(current, level.score, level.instability, best)
+        return cls(level.instability, level.state, level.score, offers)
+
+
+def extra_log_odds(
+    alike: EqualWidthGroups, log_prior_by_variant: dict[int, Array]
+) -> Array:
+    """Positive log prior odds of groups, (m,); 0 for those unlikely before the rows.
+
+    A cause that begins in one triad where the device was off also begins in the other,
+    whether or not the rows show it.
+    """
+    out = np.zeros(len(alike.cause))
+    for i, shares in log_prior_by_variant.items():
+        own = alike.cause == i
+        out[own] = np.maximum(shares[alike.variant[own]], 0.0)
+    return out
+
+
+def ranked_offers(
+    current: Set, score: float, instability: InstabilityIndices, best: BestVariants
+) -> list[Offer]:
+    """Offers of causes that a set does not contain, the best first.
+
+    Of causes that differ only in their position, the best one.
+    """
+    offers = [
+        Offer((cause, cause.variants[v]), score + added, size, instability)
+        for cause, (added, v, size) in best.items()
+        if cause.key not in current.keys
+    ]
+    best_by_name: dict[tuple[str, str], Offer] = {}
+    for offer in sorted(offers, key=lambda o: -o.score):
+        best_by_name.setdefault(offer.member[0].name_and_part, offer)
+    return [*best_by_name.values()]
+
 
 OfferKey = tuple[SetKey, Sizes | None]
 """Key of a set, and the sizes to which its offers are restricted, if any."""
@@ -48,13 +129,7 @@ MAX_LOG_DISTANCE = 12.0
 
 
 class Offers:
-    """Finds the causes that may be added to a set, and predicts the scores with them.
-
-    Parameters
-    ----------
-    sets : evaluates sets, and has the Gram matrix of the rows
-
-    """
+    """Finds the causes that may be added to a set, and predicts scores with them."""
 
     def __init__(self, sets: Sets) -> None:
         self.sets = sets
@@ -89,12 +164,7 @@ class Offers:
             levels = list(at_tried_instabilities(self.sets, current, other_sizes))
             best = self._best_variants(levels, *self.cause_log_priors(current))
             self._tables[offer_key] = [
-                OfferTable(
-                    level.instability,
-                    level.state,
-                    level.score,
-                    ranked_offers(current, level.score, level.instability, variants),
-                )
+                OfferTable.of(current, level, variants)
                 for level, variants in zip(levels, best, strict=True)
             ]
         return self._tables[offer_key]

@@ -25,14 +25,13 @@ Source: the matrix determinant lemma and the Woodbury identity.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Self
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.eliminated import (
     MIN_EIGENVALUE,
@@ -40,8 +39,10 @@ from fieldcal.model.evidence.eliminated import (
     evidence_gains,
     gains_from_eigenvalues,
 )
+from fieldcal.model.evidence.sets import Set, Sets, is_function
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX
 from fieldcal.model.priors import SIZES
+from fieldcal.model.search.offers import Offer, OfferTable
 
 Pair = tuple[int, int]
 PairGain = tuple[float, Pair, Pair]
@@ -119,10 +120,8 @@ def _gains_of_equal_widths(
     pairs: Sequence[list[int]],
 ) -> Iterator[PairGain]:
     """Gains of pairs whose first groups, and whose second groups, have equal widths."""
-    first, then = (
-        _GroupsAfterOthers(one, two, shared),
-        _GroupsAfterOthers(two, one, shared.swapaxes(1, 2)),
-    )
+    first = _GroupsAfterOthers(one, two, shared)
+    then = _GroupsAfterOthers(two, one, shared.swapaxes(1, 2))
     n = np.arange(len(pairs))
     maxima = []
     for begin in (start, np.full(len(pairs), UNIT_INDEX)):
@@ -135,8 +134,7 @@ def _gains_of_equal_widths(
         yield gain, (i, j), sizes
 
 
-@dataclass(frozen=True, slots=True)
-class _SeparateGroups:
+class _SeparateGroups(NamedTuple):
     """n groups of k columns each, as if each were added to the set without the others.
 
     Attributes
@@ -157,23 +155,21 @@ class _SeparateGroups:
     profile: Array
 
     @classmethod
-    def of(cls, inner: Array, rhs: Array, at: Index) -> Self:
+    def of(cls, inner: Array, rhs: Array, at: Index) -> _SeparateGroups:
         """Groups with columns `at` (n, k), of M and b of the columns of all groups."""
         own, right = inner[at[:, :, None], at[:, None, :]], rhs[at]
         strength, axes = np.linalg.eigh(own)
         top = np.diagonal(own, 0, 1, 2).max(axis=1, keepdims=True)
         determined = strength > MIN_EIGENVALUE * np.maximum(top, 1e-300)
-        axes, strength = (
-            axes * determined[:, None, :],
-            np.where(determined, strength, 0.0),
-        )
+        axes = axes * determined[:, None, :]
+        strength = np.where(determined, strength, 0.0)
         along = (right[:, None, :] @ axes)[:, 0]
         profile = gains_from_eigenvalues(strength, along**2) + LOG_DENSITY
         return cls(at, own, right, strength, axes, along, profile)
 
-    def at_numbers(self, numbers: Index | NDArray[np.bool_]) -> Self:
+    def at_numbers(self, numbers: Index | Mask) -> _SeparateGroups:
         """The groups of these numbers, which may repeat."""
-        return type(self)(*(getattr(self, name)[numbers] for name in self.__slots__))
+        return _SeparateGroups._make(values[numbers] for values in self)
 
 
 class _GroupsAfterOthers:
@@ -231,3 +227,58 @@ class _GroupsAfterOthers:
         log_det += np.linalg.slogdet(inner)[1]
         gain: Array = 0.5 * (square - log_det)
         return gain
+
+
+PAIRED_CAUSES = 16
+"""Causes of which pairs are tried."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OfferedPair:
+    """Two offers that are added to a set together.
+
+    Attributes
+    ----------
+    first, second : the offers, each at its most probable size beside the other
+    score : predicted score of the set with both
+
+    """
+
+    first: Offer
+    second: Offer
+    score: float
+
+    @property
+    def keys(self) -> tuple[str, str]:
+        """Keys of the two causes."""
+        return self.first.member[0].key, self.second.member[0].key
+
+
+def offered_pairs(
+    sets: Sets, current: Set, table: OfferTable, least: float
+) -> Iterator[OfferedPair]:
+    """Pairs of a table's offers; those with a score below `least` may be omitted.
+
+    Offers are also tried with all their parameters.
+    """
+    narrow = [o for o in table.offers if not is_function(o.member)][:PAIRED_CAUSES]
+    offers = [*narrow, *(o.with_all_parameters() for o in narrow)]
+    count = len(narrow)
+    widened = [a is not b for a, b in zip(narrow, offers[count:], strict=True)]
+    pairs, log_prior = [], {}
+    for i, j in combinations(range(count), 2):
+        wide = i + widened[i] * count, j + widened[j] * count
+        both = [*current.members, narrow[i].member, narrow[j].member]
+        chance = sets.set_log_prior(both) - sets.set_log_prior(current.members)
+        for pair in {(i, j), wide}:
+            pairs.append(pair)
+            log_prior[pair] = chance
+    groups, sizes = [o.member[1] for o in offers], [o.size for o in offers]
+    enough = [least - table.score - log_prior[pair] for pair in pairs]
+    for gain, pair, (u, v) in pair_gains(table.state, groups, sizes, pairs, enough):
+        first, second = (offers[i] for i in pair)
+        yield OfferedPair(
+            replace(first, size=u),
+            replace(second, size=v),
+            table.score + (gain + log_prior[pair]),
+        )

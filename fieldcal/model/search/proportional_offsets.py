@@ -22,10 +22,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.basis import General, RowView
-from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
+from fieldcal.model.causes.cause import MIN_WINDOWS, Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.unknown_causes import typical_unknown_sizes
 from fieldcal.model.evidence.eliminated import Eliminated
@@ -34,19 +34,19 @@ from fieldcal.model.evidence.sets import Set
 
 def proportional_causes(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:
     """Causes of proportional offsets, about the window offsets beside each set."""
-    for part, channels in TRIADS:
-        observed = np.intersect1d(channels, dictionary.observed)
+    for part, observed in dictionary.triads:
         if len(observed) < 2 or len(dictionary.window_positions) <= MIN_WINDOWS:
             continue
-        about = [_window_offsets(dictionary, fitted, observed) for fitted in sets]
-        groups = tuple(
-            _proportional_group(dictionary, part, observed, offsets)
-            for offsets in about
+        groups = []
+        for fitted in sets:
+            offsets = _window_offsets(dictionary, fitted, observed)
+            groups.append(_proportional_group(dictionary, part, observed, offsets))
+        yield Cause(
+            "position", part, priors.UNKNOWN_FUNCTION_CHANCE, tuple(groups), "unknown"
         )
-        yield Cause("position", part, priors.UNKNOWN_FUNCTION_CHANCE, groups, "unknown")
 
 
-def _window_offsets(d: Dictionary, fitted: Set, channels: Array) -> Array:
+def _window_offsets(d: Dictionary, fitted: Set, channels: Index) -> Array:
     """Offsets of the windows that a set does not explain, in typical sizes, (p, c)."""
     rows = fitted.state.rows.gram.with_instability(
         priors.SIZES[0] * d.typical_instability
@@ -57,12 +57,11 @@ def _window_offsets(d: Dictionary, fitted: Set, channels: Array) -> Array:
         columns, np.repeat(typical_unknown_sizes(d)[channels], len(d.window_positions))
     )
     inner.flat[:: len(columns) + 1] += 1 / priors.SIZES[-1] ** 2
-    offsets: Array = np.linalg.solve(inner, rhs).reshape(len(channels), -1).T
-    return offsets
+    return np.linalg.solve(inner, rhs).reshape(len(channels), -1).T
 
 
 def _proportional_group(
-    d: Dictionary, part: str, channels: Array, offsets: Array
+    d: Dictionary, part: str, channels: Index, offsets: Array
 ) -> Group:
     """Group about the leading singular vectors of the offsets."""
     course, size, directions = np.linalg.svd(offsets, full_matrices=False)
@@ -79,5 +78,5 @@ def _proportional_group(
         return out
 
     width = len(offsets) + len(directions) - 1
-    at = d.add(General("in proportion", of), width) + np.arange(width)
+    at = d.add(General("in proportion", of), width)
     return Group("position", part, at, np.ones(width))

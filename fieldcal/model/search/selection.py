@@ -9,9 +9,8 @@ import numpy as np
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set, Sets, is_function
 from fieldcal.model.evidence.sizing import Member, Sizes
-from fieldcal.model.search.offer import Offer
-from fieldcal.model.search.offered_pairs import OfferedPair, offered_pairs
-from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offers
+from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offer, Offers
+from fieldcal.model.search.pairs import OfferedPair, offered_pairs
 from fieldcal.model.search.variations import (
     ALTERNATIVE_MARGIN,
     drop_superfluous,
@@ -34,17 +33,7 @@ PREDICTION_SLACK = 3.0
 
 
 class Search:
-    """The search over one Gram matrix.
-
-    Parameters
-    ----------
-    sets : evaluates sets, and keeps those that were visited
-
-    Attributes
-    ----------
-    offers : to any set
-
-    """
+    """The search over one Gram matrix, with the sets visited, and offers to any set."""
 
     def __init__(self, sets: Sets) -> None:
         self.sets, self.offers = sets, Offers(sets)
@@ -106,10 +95,7 @@ class Search:
         return current
 
     def _with_one_more(
-        self,
-        current: Set,
-        level: float | None = None,
-        other_sizes: Sizes | None = None,
+        self, current: Set, level: float | None = None, other_sizes: Sizes | None = None
     ) -> Set:
         """The best set with one cause more; the set itself if none comes near a level.
 

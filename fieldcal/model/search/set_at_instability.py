@@ -7,21 +7,67 @@ the same reason.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.cause import CLOSURE, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Sizes
-from fieldcal.model.search.instabilities import InstabilityIndices, tried_instabilities
+
+InstabilityIndices = tuple[int, ...]
+"""Indices of instabilities in `priors.SIZES`, (7,)."""
+
+INSTABILITY_STEPS_DOWN = (3, 6, 9, 40)
+"""Steps of `priors.SIZES` by which the instability may decrease when a cause explains
+it: by factors of 6, 32 and 180, and to the smallest size."""
+
+LOWERED_TOGETHER = ((0, 1, 2), (3, 4, 5, 6))
+"""Instabilities that decrease together: of a triad; closures with the gyroscopes."""
+
+RAISED_CLOSURES = (UNIT_INDEX + 1, UNIT_INDEX + 5)
+"""Sizes to which the instability of closures may rise when that of the accelerometers
+decreases, since errors of closures come from both: one step above the typical size, and
+ten times it."""
 
 FLICKER_STEPS_DOWN = (1, 2)
 """Steps of `priors.SIZES` by which the size of flicker may decrease when a cause
 explains it: at its full size, flicker explains most of a random walk."""
+
+
+def tried_instabilities(
+    typical: Array, instability: InstabilityIndices, other: InstabilityIndices | None
+) -> list[InstabilityIndices]:
+    """A set's instability, and that of another set or some smaller ones.
+
+    `typical` (7,) is the typical instability, 0 where there is none.
+    """
+    if other is not None:
+        return list(dict.fromkeys([instability, other]))
+    tried = [instability]
+    for lowered in LOWERED_TOGETHER if typical.any() else ():
+        for down in INSTABILITY_STEPS_DOWN:
+            tried.append(lowered_instability(instability, lowered, down))
+    acc = LOWERED_TOGETHER[0]
+    if typical[CLOSURE] and max(instability[c] for c in acc) > UNIT_INDEX:
+        steady = lowered_instability(instability, acc, INSTABILITY_STEPS_DOWN[-1])
+        tried += [
+            steady[:CLOSURE] + (max(steady[CLOSURE], up),) for up in RAISED_CLOSURES
+        ]
+    return list(dict.fromkeys(tried))
+
+
+def lowered_instability(
+    instability: InstabilityIndices, lowered: Sequence[int], down: int
+) -> InstabilityIndices:
+    """Instabilities with those of the numbers `lowered` lowered by `down` steps."""
+    return tuple(
+        max(size - down, 0) if i in lowered else size
+        for i, size in enumerate(instability)
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,79 +95,53 @@ def at_tried_instabilities(
     With `other_sizes`, the sizes of another set, only the instability and the flicker
     of that set are tried in addition to the set's own.
     """
-    sizes = current.sizes
-    base = current.score - current.state.score
-    base -= sets.instability_log_prior(sizes.instability)
-    columns, prior_sigma = current.state.columns, current.state.prior_sigma
-    calibrations = [
-        (prior_sigma, 0.0),
-        with_typical_calibration(sets.dictionary, current),
-    ]
+    own, state = current.sizes, current.state
+    base = current.score - state.score - sets.instability_log_prior(own.instability)
+
+    def at(
+        instability: InstabilityIndices, prior_sigma: Array, cost: float = 0.0
+    ) -> SetAtInstability:
+        rows = sets.gram_at(instability)
+        there = Eliminated.of(rows, state.columns, prior_sigma)
+        score = base + cost + there.score + sets.instability_log_prior(instability)
+        return SetAtInstability(instability, there, score)
+
+    calibration, cost = with_typical_calibration(sets.dictionary, current)
     other = None if other_sizes is None else other_sizes.instability
     for instability in tried_instabilities(
-        sets.typical_instability, sizes.instability, other
+        sets.typical_instability, own.instability, other
     ):
-        lowered = instability != sizes.instability
-        rows = sets.gram_at(instability)
-        for sigma, cost in (
-            calibrations if lowered and calibrations[1][1] else calibrations[:1]
-        ):
-            state = Eliminated.of(rows, columns, sigma)
-            score = base + cost + state.score + sets.instability_log_prior(instability)
-            yield SetAtInstability(instability, state, score)
+        yield at(instability, state.prior_sigma)
+        if cost and instability != own.instability:
+            yield at(instability, calibration, cost)
     if other_sizes is None:
-        yield from _with_smaller_permanent_groups(sets, current)
-    else:
-        yield from _with_flicker_of(sets, current, base, other_sizes)
+        for sizes in _smaller_permanent_groups(sets.dictionary, current):
+            yield at(own.instability, *_with_sizes(sets.dictionary, current, sizes))
+        return
+    always = zip(
+        sets.dictionary.always, own.calibration, other_sizes.calibration, strict=True
+    )
+    flicker = [theirs if g.random else ours for g, ours, theirs in always]
+    prior_sigma, cost = _with_sizes(sets.dictionary, current, flicker)
+    if (prior_sigma != state.prior_sigma).any():
+        yield at(other_sizes.instability, prior_sigma, cost)
 
 
-def _with_smaller_permanent_groups(
-    sets: Sets, current: Set
-) -> Iterator[SetAtInstability]:
-    """The set with single permanent groups at smaller sizes.
+def _smaller_permanent_groups(
+    dictionary: Dictionary, current: Set
+) -> Iterator[list[int]]:
+    """Sizes of the permanent groups, with a single one of them smaller.
 
     At its full size, a permanent group may absorb a cause that changes all axes, or one
     that is a course in time.
     """
-    instability = current.sizes.instability
-    rows = sets.gram_at(instability)
-    for group, place, size in permanent_groups(sets.dictionary, current):
+    sizes = list(current.sizes.calibration)
+    for i, group in enumerate(dictionary.always):
         if group.fixed_size is None and (group.changes_together or not group.in_state):
             # flicker is what few windows have instead of instability
-            down = [max(size - d, 0) for d in FLICKER_STEPS_DOWN if group.random]
+            down = [max(sizes[i] - d, 0) for d in FLICKER_STEPS_DOWN if group.random]
             for smaller in dict.fromkeys([*down, 0]):
-                sigma = current.state.prior_sigma.copy()
-                sigma[place] = group.prior_sigma(float(priors.SIZES[smaller]))
-                state = Eliminated.of(rows, current.state.columns, sigma)
-                lost = LOG_DENSITY[smaller] - LOG_DENSITY[size]
-                score = current.score - current.state.score + state.score
-                yield SetAtInstability(instability, state, score + lost)
-
-
-def _with_flicker_of(
-    sets: Sets, current: Set, base: float, other_sizes: Sizes
-) -> Iterator[SetAtInstability]:
-    """The set with the flicker sizes of another set, if it has flicker.
-
-    `base` is the set's log prior without that of its instability.
-    """
-    sigma, changed = current.state.prior_sigma.copy(), False
-    instability = other_sizes.instability
-    pairs = zip(
-        permanent_groups(sets.dictionary, current),
-        other_sizes.calibration,
-        strict=True,
-    )
-    for (group, place, size), other in pairs:
-        if group.random and group.fixed_size is None and other != size:
-            sigma[place] = group.prior_sigma(float(priors.SIZES[other]))
-            base += float(LOG_DENSITY[other] - LOG_DENSITY[size])
-            changed = True
-    if changed:
-        rows = sets.gram_at(instability)
-        state = Eliminated.of(rows, current.state.columns, sigma)
-        score = base + state.score + sets.instability_log_prior(instability)
-        yield SetAtInstability(instability, state, score)
+                yield [*sizes[:i], smaller, *sizes[i + 1 :]]
 
 
 def with_typical_calibration(
@@ -132,11 +152,20 @@ def with_typical_calibration(
     If a large instability absorbs all differences, the most probable sizes of the
     calibration are too small.
     """
+    sizes = [max(size, UNIT_INDEX) for size in current.sizes.calibration]
+    return _with_sizes(dictionary, current, sizes)
+
+
+def _with_sizes(
+    dictionary: Dictionary, current: Set, sizes: Sequence[int]
+) -> tuple[Array, float]:
+    """Prior sizes with other sizes of the permanent groups, and their cost, ln."""
     prior_sigma, cost = current.state.prior_sigma.copy(), 0.0
-    for group, place, size in permanent_groups(dictionary, current):
-        if group.fixed_size is None and size < UNIT_INDEX:
-            prior_sigma[place] = group.prior_sigma(float(priors.SIZES[UNIT_INDEX]))
-            cost += float(LOG_DENSITY[UNIT_INDEX] - LOG_DENSITY[size])
+    own = permanent_groups(dictionary, current)
+    for (group, place, before), size in zip(own, sizes, strict=True):
+        if group.fixed_size is None and size != before:
+            prior_sigma[place] = group.prior_sigma(float(priors.SIZES[size]))
+            cost += float(LOG_DENSITY[size] - LOG_DENSITY[before])
     return prior_sigma, cost
 
 

@@ -39,7 +39,7 @@ def visit_variations(sets: Sets, current: Set, top: float) -> None:
         variations = _variations(sets, current, cause, group)
         if not variations:
             continue
-        added = _added_log_evidence(_eliminate_without(current, group), variations)
+        added = _added_log_evidence(current.state.without(group.columns), variations)
         bare = current.score - added[group]
         rest = (*current.members[:i], *current.members[i + 1 :])
         log_prior = sets.set_log_prior(current.members)
@@ -75,7 +75,8 @@ def widen_outputs(sets: Sets, current: Set) -> Set:
         wider = [g for g in own if {*g.params} > {*group.params}]
         if cause.kind != "effect" or not wider:
             continue
-        added = _added_log_evidence(_eliminate_without(current, group), [group, *wider])
+        rest = current.state.without(group.columns)
+        added = _added_log_evidence(rest, [group, *wider])
         most = max(added, key=lambda g: added[g])
         if most is not group:
             members = tuple((c, most if c is cause else g) for c, g in current.members)
@@ -93,13 +94,6 @@ def with_all_parameters(sets: Sets, current: Set) -> Set:
 def score_of(candidate: Set) -> float:
     """Score of a set, to compare sets by."""
     return candidate.score
-
-
-def _eliminate_without(current: Set, group: Group) -> Eliminated:
-    """The state of a set without one of its groups, at unchanged sizes."""
-    state = current.state
-    kept = ~np.isin(state.columns, group.columns)
-    return Eliminated.of(state.rows, state.columns[kept], state.prior_sigma[kept])
 
 
 def _added_log_evidence(

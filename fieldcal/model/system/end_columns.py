@@ -7,8 +7,9 @@ them, so its derivative is a central difference.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +26,7 @@ from fieldcal.physics.experience import Experience
 from fieldcal.physics.experience_rows import select_rows
 
 
-@dataclass(frozen=True, slots=True)
-class TurnEnds:
+class TurnEnds(NamedTuple):
     """Inputs in some positions, or at the two ends of a turn.
 
     Attributes
@@ -46,24 +46,24 @@ class TurnEnds:
         return cls(x.f, x.w, x.to_device)
 
     @classmethod
-    def stacked(cls, ends: list[TurnEnds]) -> TurnEnds:
+    def stacked(cls, ends: Iterable[TurnEnds]) -> TurnEnds:
         """Stack several inputs of the same positions, (k, n, ...)."""
-        return cls(
-            *(np.stack([getattr(e, n) for e in ends]) for n in ("f", "w", "held"))
-        )
+        return cls(*map(np.stack, zip(*ends, strict=True)))
 
-    def at(self, *place: object) -> TurnEnds:
+    @classmethod
+    def concatenated(cls, ends: Iterable[TurnEnds]) -> TurnEnds:
+        """Concatenate along the first axis."""
+        return cls(*map(np.concatenate, zip(*ends, strict=True)))
+
+    def at(self, *place: Any) -> TurnEnds:
         """Some of the positions, by index."""
-        return TurnEnds(self.f[place], self.w[place], self.held[place])  # type: ignore[index]
+        return TurnEnds(*(values[place] for values in self))
 
     def with_end(self, here: int, other: TurnEnds) -> TurnEnds:
         """Both ends (2, ...), k times, with end `here` from `other` (k, ...)."""
-        parts = []
-        for name in ("f", "w", "held"):
-            own, new = getattr(self, name), getattr(other, name)
-            repeated = np.repeat(own[None], len(new), axis=0)
-            repeated[:, here] = new
-            parts.append(repeated)
+        parts = [np.repeat(own[None], len(other.f), axis=0) for own in self]
+        for part, new in zip(parts, other, strict=True):
+            part[:, here] = new
         return TurnEnds(*parts)
 
 
@@ -98,8 +98,8 @@ class EndColumns:
         ups, downs, steps = zip(*one.sides(plain, state), strict=True)
         return cls(
             first, places, one.per_position, TurnEnds.of(state.experienced(plain)),
-            TurnEnds.stacked([TurnEnds.of(x) for x in ups]),
-            TurnEnds.stacked([TurnEnds.of(x) for x in downs]), np.array(steps),
+            TurnEnds.stacked(map(TurnEnds.of, ups)),
+            TurnEnds.stacked(map(TurnEnds.of, downs)), np.array(steps),
         )  # fmt: skip
 
     def columns_for(self, turn: Turn, scale: Array) -> tuple[Index, Array, Array]:
@@ -111,13 +111,11 @@ class EndColumns:
         columns, up, down, step = self._at(np.searchsorted(self.places, turn.positions))
         f, w = ((a - b) / (2 * step[:, None, None])
                 for a, b in ((up.f, down.f), (up.w, down.w)))  # fmt: skip
-        outputs = np.concatenate(
-            [
-                interpolate_vectors(turn.attitude, turn.done, *np.moveaxis(v, 0, 2))
-                for v in (f, w)
-            ],
-            axis=1,
-        )
+        each = [
+            interpolate_vectors(turn.attitude, turn.done, *np.moveaxis(v, 0, 2))
+            for v in (f, w)
+        ]
+        outputs = np.concatenate(each, axis=1)
         end = turn.attitude[-1]
         one, other = (closures(x.f, x.held, end)[0] for x in (up, down))
         moved = ((one - other) / (2 * step[:, None])).T
@@ -133,17 +131,9 @@ class EndColumns:
         base = self.base.at(ends)
         columns = self.first + count * self.places[ends][:, None] + np.arange(count)
         up, down = (
-            _concatenate(
+            TurnEnds.concatenated(
                 base.with_end(i, some.at(slice(None), p)) for i, p in enumerate(ends)
             )
             for some in (self.up, self.down)
         )
         return columns.ravel(), up, down, np.tile(self.step, 2)
-
-
-def _concatenate(parts: Iterator[TurnEnds]) -> TurnEnds:
-    """Concatenate along the columns."""
-    arrays = list(parts)
-    return TurnEnds(
-        *(np.concatenate([getattr(e, n) for e in arrays]) for n in ("f", "w", "held"))
-    )

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +33,23 @@ class LinearRows:
     design: Array
     white: Array
 
+    def select_rows(self, kept: Mask) -> LinearRows:
+        """Some of its rows, by (r,)."""
+        rows, window, weight = self.rows[kept], self.window[kept], self.weight[kept]
+        design, white = self.design[kept], self.white[kept]
+        return LinearRows(
+            self.channel, rows, window, weight, self.columns, design, white
+        )
+
+    def select_columns(self, columns: Mask) -> LinearRows:
+        """The rows with only some columns, (all,) of the dictionary."""
+        kept = columns[self.columns]
+        return replace(self, columns=self.columns[kept], design=self.design[:, kept])
+
     @property
     def starts(self) -> Index:
         """First row of each of its windows, (w,)."""
-        first: Index = np.flatnonzero(np.diff(self.window, prepend=-1))
-        return first
+        return np.flatnonzero(np.diff(self.window, prepend=-1))
 
     @property
     def windows(self) -> Index:
@@ -47,12 +59,10 @@ class LinearRows:
     @property
     def info(self) -> Array:
         """Inverse variance of the mean of each window, (w,)."""
-        total: Array = np.add.reduceat(self.weight**2, self.starts)
-        return total
+        return np.add.reduceat(self.weight**2, self.starts)
 
     def window_means(self, white: Array) -> Array:
         """Weighted mean of each window, (w, ...), of whitened rows (r, ...)."""
         weight = self.weight.reshape(-1, *[1] * (white.ndim - 1))
         total = np.add.reduceat(white * weight, self.starts, axis=0)
-        mean: Array = total / self.info.reshape(-1, *[1] * (white.ndim - 1))
-        return mean
+        return total / self.info.reshape(-1, *[1] * (white.ndim - 1))

@@ -10,16 +10,16 @@ channel by channel.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import CLOSURE
+from fieldcal.model.causes.basis import Course
+from fieldcal.model.causes.cause import CLOSURE, Basis
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.gram import Gram
@@ -37,13 +37,7 @@ Parts = dict[int, list[tuple[Index, Array]]]
 
 
 class System(ABC):
-    """Rows and a dictionary, linearised about states.
-
-    Parameters
-    ----------
-    dictionary : columns of the rows
-
-    """
+    """Rows, and a dictionary of their columns, linearised about states."""
 
     def __init__(self, dictionary: Dictionary) -> None:
         self.dictionary = dictionary
@@ -52,11 +46,69 @@ class System(ABC):
     def independent_copy(self) -> Self:
         """The same rows with a copy of the dictionary."""
 
+    @property
     @abstractmethod
-    def linearised(
-        self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[LinearRows]:
+    def used(self) -> Mask:
+        """Rows with a value, by channel, (n, 6)."""
+
+    def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
+        table_of, off = self._about(state)
+        asked = self._every_column() if wanted is None else wanted
+        out = [
+            self._whitened(
+                c,
+                np.concatenate([at for at, _ in parts]),
+                np.hstack([table for _, table in parts]),
+                off[:, c],
+            )
+            for c, parts in self._parts(table_of, asked).items()
+            if parts
+        ]
+        if wanted is None:
+            for part in out:
+                self.dictionary.shown[part.columns] |= self._shows(part)
+        return out
+
+    @abstractmethod
+    def _about(self, state: State) -> tuple[Callable[[Basis], Array], Array]:
+        """What evaluates a basis about a state; recorded less calculated, (n, 6)."""
+
+    @abstractmethod
+    def _whitened(
+        self, channel: int, columns: Index, table: Array, off: Array
+    ) -> LinearRows:
+        """Rows of a channel with columns (k,), of a table (n, k) and residuals (n,)."""
+
+    def _every_column(self) -> Mask:
+        """The columns of rows that are linearised with all of them."""
+        return np.ones(self.dictionary.width, dtype=bool)
+
+    def _shows(self, part: LinearRows) -> Mask:
+        """Whether each column of a channel exceeds the noise at typical size, (k,)."""
+        typical = self.dictionary.typical[part.columns]
+        shows: Mask = np.linalg.norm(part.design, axis=0) * typical > MIN_VISIBLE_SIGMAS
+        return shows
+
+    def _parts(self, table_of: Callable[[Basis], Array], wanted: Mask) -> Parts:
+        """Wanted columns with influence on each channel."""
+        parts: Parts = {c: [] for c in self.dictionary.observed.tolist()}
+        used = self.used
+        for first, end, basis in self.dictionary.basis_ranges():
+            at, kept = np.arange(first, end), wanted[first:end]
+            if not kept.any():
+                continue
+            table = table_of(basis)
+            if isinstance(basis, Course):
+                _append_course(parts, at, table, kept)
+                continue
+            if not kept.all():
+                at, table = at[kept], table[:, :, kept]
+            for c, channel_parts in parts.items():
+                shown = ((table[:, c] != 0.0) & used[:, c, None]).any(axis=0)
+                if shown.any():
+                    channel_parts.append((at[shown], table[:, c, shown]))
+        return parts
 
     def linearisation_error(self, state: State, other: State, step: Array) -> float:
         """Largest error of the rows of another state, linearised about a state.
@@ -71,9 +123,7 @@ class System(ABC):
         return np.zeros(2)
 
 
-def append_course(
-    parts: Parts, at: Index, table: Array, kept: NDArray[np.bool_]
-) -> None:
+def _append_course(parts: Parts, at: Index, table: Array, kept: Mask) -> None:
     """Append the columns `at` of a `Course`, as far as they are `kept`, to `parts`."""
     width = table.shape[1]
     for c, channel_parts in parts.items():
@@ -95,27 +145,8 @@ def gram(
     if None.
     """
     kept = np.arange(dictionary.width) if columns is None else np.unique(columns)
-    index = np.full(dictionary.width, -1, dtype=np.intp)
-    index[kept] = np.arange(len(kept))
-    held = dictionary.window_positions
-    size = len(held) + len(turns)
-    kind = np.tile(np.arange(6), (size, 1))
-    kind[len(held) :] = CLOSURE
-    shared = np.zeros((size, 6))
-    shared[: len(held)] = dictionary.window_error
-    out = Gram(
-        np.zeros((len(kept), len(kept))),
-        np.zeros(len(kept)),
-        0.0,
-        np.zeros((size, 6, len(kept))),
-        np.zeros((size, 6)),
-        np.zeros((size, 6)),
-        shared,
-        np.zeros((size, 6, 2)),
-        kind,
-        np.zeros((size, 6, 6)),
-        index,
-    )
+    out = _empty_gram(dictionary, kept, len(turns))
+    held, index = dictionary.window_positions, out.index
     free = np.zeros(dictionary.width, dtype=bool)
     for j in np.flatnonzero(dictionary.unoriented):
         free[dictionary.rotations_of(held[j])] = True
@@ -130,9 +161,25 @@ def gram(
     return replace(out, square=sum(squares))
 
 
-def _add_windows(
-    out: Gram, part: LinearRows, values: Array, free: NDArray[np.bool_]
-) -> float:
+def _empty_gram(dictionary: Dictionary, kept: Index, turns: int) -> Gram:
+    """Gram matrix of some columns (k,) without any row."""
+    index = np.full(dictionary.width, -1, dtype=np.intp)
+    index[kept] = np.arange(len(kept))
+    held, k = len(dictionary.window_positions), len(kept)
+    size = held + turns
+    kind = np.tile(np.arange(6), (size, 1))
+    kind[held:] = CLOSURE
+    shared = np.zeros((size, 6))
+    shared[:held] = dictionary.window_error
+    return Gram(
+        within=np.zeros((k, k)), rhs=np.zeros(k), square=0.0,
+        means=np.zeros((size, 6, k)), residual=np.zeros((size, 6)),
+        info=np.zeros((size, 6)), shared=shared, free_rotations=np.zeros((size, 6, 2)),
+        kind=kind, closure_errors=np.zeros((size, 6, 6)), index=index,
+    )  # fmt: skip
+
+
+def _add_windows(out: Gram, part: LinearRows, values: Array, free: Mask) -> float:
     """Add one channel's rows; returns its squares about the means.
 
     Of the columns `free` (k,), rotations of unknown orientations, only the means are
@@ -141,10 +188,8 @@ def _add_windows(
     """
     c, all_ = part.channel, out.index[part.columns]
     selected = all_ >= 0
-    at, design = (
-        all_[selected],
-        part.design if selected.all() else part.design[:, selected],
-    )
+    at = all_[selected]
+    design = part.design if selected.all() else part.design[:, selected]
     in_state = np.where(free[part.columns], 0.0, values[part.columns])
     white = part.white + part.design @ in_state
     rotated = part.design @ (values[part.columns] - in_state)

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import ACC, GYR, Array, Index
-from fieldcal.model.causes.basis import Course, General, RowView
-from fieldcal.model.causes.cause import TRIADS
+from fieldcal.core.samples import ACC, GYR, Array, Index, Mask
+from fieldcal.model.causes.basis import Course, RowView
+from fieldcal.model.causes.cause import TRIADS, Basis
 from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
-from fieldcal.model.system.linear_system import (
-    MIN_VISIBLE_SIGMAS,
-    Parts,
-    System,
-    append_course,
-)
+from fieldcal.model.system.linear_system import System
 
 
 class MotionSystem(System):
@@ -48,44 +42,28 @@ class MotionSystem(System):
         """The same rows with a copy of the dictionary."""
         return MotionSystem(self.dictionary.independent_copy(), self.power)
 
-    def linearised(
-        self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[LinearRows]:
-        """Rows of every channel about a state, with all columns or those wanted."""
-        d, rows = self.dictionary, self.motion
-        views = self._views(state)
-        off = self._off(views, state)
-        white = rows.cosines(np.where(rows.used, off, 0.0))
-        parts: Parts = {c: [] for c in d.observed.tolist()}
-        asked = self._grouped() if wanted is None else wanted
-        for first, end, basis in d.basis_ranges():
-            at, kept = np.arange(first, end), asked[first:end]
-            if not kept.any():
-                continue
-            if isinstance(basis, Course):
-                append_course(parts, at, rows.cosines(basis.evaluate(views[0])), kept)
-                continue
-            table = self._table(basis, views)
-            for c, channel_parts in parts.items():
-                shown = kept & np.any(table[:, c] != 0.0, axis=0)
-                if shown.any():
-                    channel_parts.append((at[shown], rows.cosines(table[:, c, shown])))
-        out = [
-            self._channel(c, channel_parts, white[:, c])
-            for c, channel_parts in parts.items()
-            if channel_parts
-        ]
-        if wanted is None:
-            for part in out:
-                size = np.linalg.norm(part.design, axis=0) * d.typical[part.columns]
-                d.shown[part.columns] |= size > MIN_VISIBLE_SIGMAS
-        return out
+    @property
+    def used(self) -> Mask:
+        """Rows with a value, by channel, (n, 6)."""
+        return self.motion.used
 
-    def _views(self, state: State) -> list[RowView]:
-        """Rows with the accelerometers' inputs, and the gyroscopes' if different."""
+    def _about(self, state: State) -> tuple[Callable[[Basis], Array], Array]:
+        """What evaluates a basis about a state, and recorded less calculated, (n, 6).
+
+        Columns of gyroscopes have inputs of their own if the responses differ.
+        """
         d = self.dictionary
         inputs = [d.x] if d.gyro_inputs is d.x else [d.x, d.gyro_inputs]
-        return [RowView.of(x, d.since, state) for x in inputs]
+        views = [RowView.of(x, d.since, state) for x in inputs]
+
+        def table_of(basis: Basis) -> Array:
+            table = basis.evaluate(views[0])
+            if len(views) == 1 or isinstance(basis, Course):
+                return table
+            of_gyr = basis.evaluate(views[1])
+            return np.concatenate([table[:, ACC], of_gyr[:, GYR]], axis=1)
+
+        return table_of, np.where(self.used, self._off(views, state), 0.0)
 
     def _off(self, views: Sequence[RowView], state: State) -> Array:
         """Recorded less calculated outputs, (n, 6).
@@ -109,17 +87,7 @@ class MotionSystem(System):
             out[:, triad] -= state.scale[triad] * lag
         return out
 
-    @staticmethod
-    def _table(basis: General, views: Sequence[RowView]) -> Array:
-        """Columns of all channels, with the gyroscopes' own inputs."""
-        table = basis.evaluate(views[0])
-        if len(views) > 1:
-            table = np.concatenate(
-                [table[:, ACC], basis.evaluate(views[1])[:, GYR]], axis=1
-            )
-        return table
-
-    def _grouped(self) -> NDArray[np.bool_]:
+    def _every_column(self) -> Mask:
         """Columns that belong to a group."""
         d = self.dictionary
         out = np.zeros(d.width, dtype=bool)
@@ -127,18 +95,15 @@ class MotionSystem(System):
             out[group.columns] = True
         return out
 
-    def _channel(
-        self, c: int, parts: Sequence[tuple[Index, Array]], white: Array
+    def _whitened(
+        self, channel: int, columns: Index, table: Array, off: Array
     ) -> LinearRows:
-        """One channel's coefficients, whitened."""
-        weight = 1 / np.sqrt(self.power[:, c])
-        design = np.hstack([table for _, table in parts])
-        design *= weight[:, None]
-        columns = np.concatenate([at for at, _ in parts])
-        rows = np.arange(len(white))
-        return LinearRows(
-            int(c), rows, self.motion.part, weight, columns, design, white * weight
-        )
+        """Coefficients of a channel with columns (k,), of rows (n, k) and (n,)."""
+        weight = 1 / np.sqrt(self.power[:, channel])
+        design = self.motion.cosines(table) * weight[:, None]
+        white = self.motion.cosines(off[:, None])[:, 0] * weight
+        rows, part = np.arange(len(white)), self.motion.part
+        return LinearRows(channel, rows, part, weight, columns, design, white)
 
 
 def fit_residuals(

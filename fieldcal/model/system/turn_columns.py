@@ -7,12 +7,11 @@ once, except those that need a whole turn, or that change its ends.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
@@ -22,123 +21,60 @@ from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience_rows import concatenate_rows
 
 
-@dataclass(frozen=True, slots=True)
 class TurnColumns:
-    """Columns that can change one turn.
+    """Columns that can change one turn, with edges `view`.
 
     Attributes
     ----------
-    index : (k,) columns of the dictionary
-    closing : (3, k) derivative of the closure by each, rad
     general : columns of each basis that are used during the turn, and their outputs at
         the edges, (m + 1, 6, j)
 
     """
 
-    index: Index
-    closing: Array
-    general: list[tuple[Index, Array]]
+    def __init__(self, turn: Turn, view: RowView) -> None:
+        self.turn, self.view = turn, view
+        self._weights = turn.weights(view.state.scale[3:])  # (3, m + 1, 3)
+        self._columns: list[tuple[Index, Array]] = []
+        self.general: list[tuple[Index, Array]] = []
 
+    @property
+    def index(self) -> Index:
+        """Columns of the dictionary, (k,)."""
+        return np.concatenate([index for index, _ in self._columns])
 
-@dataclass
-class _TurnColumnsBuilder:
-    """Collects the columns of one turn."""
+    @property
+    def closing(self) -> Array:
+        """Derivative of the closure by each of these columns, (3, k) rad."""
+        return np.concatenate([closing for _, closing in self._columns], axis=1)
 
-    turn: Turn
-    view: RowView
-    index: list[Index] = field(default_factory=list)
-    closing: list[Array] = field(default_factory=list)
-    general: list[tuple[Index, Array]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.weights = self.turn.weights(self.view.state.scale[3:])
-        self.flat_weights = self.weights.reshape(3, -1)  # (3, 3 (m + 1))
-
-    def no_closing(self, index: Index) -> None:
-        """Add columns (k,) that do not change the closure through the gyroscopes."""
-        self.index.append(index)
-        self.closing.append(np.zeros((3, len(index))))
-
-    def course(self, first: int, table: Array, share: Array | None = None) -> None:
+    def add_course(self, first: int, table: Array, share: Array | None = None) -> None:
         """Add a function (m + 1, j) on each gyroscope, times `share` (m + 1, 3)."""
         width = table.shape[1]
         for c in range(3):
-            weight = self.weights[:, :, c] * (1.0 if share is None else share[:, c])
-            self.index.append(first + (3 + c) * width + np.arange(width))
-            self.closing.append(weight @ table)
+            weight = self._weights[:, :, c] * (1.0 if share is None else share[:, c])
+            index = first + (3 + c) * width + np.arange(width)
+            self._columns.append((index, weight @ table))
 
-    def general_form(
-        self, index: Index, table: Array, bent: Array | float = 0.0
+    def add_still(self, index: Index) -> None:
+        """Add columns (k,) that do not change the closure through the gyroscopes."""
+        self._columns.append((index, np.zeros((3, len(index)))))
+
+    def add_outputs(
+        self,
+        index: Index,
+        outputs: Array,
+        on_way: Mask | None,
+        bent: Array | float = 0.0,
     ) -> None:
-        """Add columns (m + 1, 6, k), with their change of the ends, (3, k)."""
-        rates = table[:, 3:].reshape(self.flat_weights.shape[1], -1)
-        self.index.append(index)
-        self.closing.append(self.flat_weights @ rates - bent)
+        """Add columns by their outputs, (m + 1, 6, k), and change of the ends, (3, k).
 
-    def met(self) -> TurnColumns:
-        """The collected columns."""
-        closing = np.concatenate(self.closing, axis=1)
-        return TurnColumns(np.concatenate(self.index), closing, self.general)
-
-
-@dataclass(frozen=True, slots=True)
-class _AllTurns:
-    """Adds the columns of a basis to all turns at once.
-
-    Attributes
-    ----------
-    builders : one for each turn
-    every : the n edges of all turns, one turn after the other
-    cut : first edge of each turn but the first
-    dictionary : of the columns
-    known : set fitted to the windows, if accelerometers during turns are used; or None
-
-    """
-
-    builders: list[_TurnColumnsBuilder]
-    every: RowView
-    cut: Index
-    dictionary: Dictionary
-    known: Set | None
-
-    def split(self, table: Array) -> Iterator[tuple[_TurnColumnsBuilder, Array]]:
-        """The builder of each turn, with the rows of a table (n, ...) at its edges."""
-        return zip(self.builders, np.split(table, self.cut), strict=True)
-
-    def add_course(self, first: int, course: Course) -> None:
-        """Add the columns of a course, of which `first` is the first."""
-        if self.dictionary.unoriented.any():  # rotates the force at the ends
-            for builder in self.builders:
-                builder.no_closing(first + np.arange(3 * course.width))
-        if course.timed:
-            for builder, table in self.split(course.evaluate(self.every)):
-                builder.course(first, table)
-        elif course.while_output_stands:
-            for builder in self.builders:
-                if builder.turn.standing_share is not None:
-                    even = np.ones((len(builder.view.x), 1))
-                    builder.course(first, even, builder.turn.standing_share)
-
-    def add_end_columns(self, ends: EndColumns) -> None:
-        """Add the columns of a basis that changes the inputs in positions."""
-        for builder in self.builders:
-            columns, outputs, bent = ends.columns_for(
-                builder.turn, builder.view.state.scale
-            )
-            builder.general_form(columns, outputs, bent)
-            if self.known is not None:
-                kept = turn_force_columns(columns, self.dictionary, self.known)
-                builder.general.append((columns[kept], outputs[:, :, kept]))
-
-    def add_outputs(self, first: int, table: Array) -> None:
-        """Add columns by their outputs (n, 6, k); `first` is the first of them."""
-        columns = first + np.arange(table.shape[2])
-        for builder, part in self.split(table):
-            builder.general_form(columns, part)
-        if self.known is not None:
-            kept = turn_force_columns(columns, self.dictionary, self.known)
-            for builder, part in self.split(table[:, :, kept]):
-                builder.general.append((columns[kept], part))
+        Those `on_way` (k,) are used during the turn as well; none if None.
+        """
+        weights = self._weights.reshape(3, -1)  # (3, 3 (m + 1))
+        rates = outputs[:, 3:].reshape(weights.shape[1], -1)
+        self._columns.append((index, weights @ rates - bent))
+        if on_way is not None:
+            self.general.append((index[on_way], outputs[:, :, on_way]))
 
 
 def columns_of_turns(
@@ -162,16 +98,50 @@ def columns_of_turns(
         return []
     every = _concatenate(views)
     cut = np.cumsum([len(view.x) for view in views])[:-1]
-    builders = [_TurnColumnsBuilder(t, v) for t, v in zip(turns, views, strict=True)]
-    collected = _AllTurns(builders, every, cut, dictionary, known)
+    loose = bool(dictionary.unoriented.any())
+    found = [TurnColumns(t, v) for t, v in zip(turns, views, strict=True)]
+
+    def on_way(columns: Index) -> Mask | None:
+        return None if known is None else turn_force_columns(columns, dictionary, known)
+
     for first, basis in dictionary.bases:
         if isinstance(basis, Course):
-            collected.add_course(first, basis)
+            _add_course(found, first, basis, loose, every, cut)
         elif first in at_ends:
-            collected.add_end_columns(at_ends[first])
+            for one in found:
+                scale = one.view.state.scale
+                columns, outputs, bent = at_ends[first].columns_for(one.turn, scale)
+                one.add_outputs(columns, outputs, on_way(columns), bent)
         else:
-            collected.add_outputs(first, _outputs(basis, views, every))
-    return [builder.met() for builder in builders]
+            table = _outputs(basis, views, every)
+            columns = first + np.arange(table.shape[2])
+            used = on_way(columns)
+            for one, part in zip(found, np.split(table, cut), strict=True):
+                one.add_outputs(columns, part, used)
+    return found
+
+
+def _add_course(
+    found: Sequence[TurnColumns],
+    first: int,
+    course: Course,
+    loose: bool,
+    every: RowView,
+    cut: Index,
+) -> None:
+    """Add a course to all turns; if ends are `loose`, it rotates the force there."""
+    if loose:
+        for one in found:
+            one.add_still(first + np.arange(3 * course.width))
+    if course.timed:
+        tables = np.split(course.evaluate(every), cut)
+        for one, table in zip(found, tables, strict=True):
+            one.add_course(first, table)
+    elif course.while_output_stands:
+        for one in found:
+            if one.turn.standing_share is not None:
+                even = np.ones((len(one.view.x), 1))
+                one.add_course(first, even, one.turn.standing_share)
 
 
 def _outputs(basis: General, views: Sequence[RowView], every: RowView) -> Array:

@@ -14,9 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
@@ -86,8 +85,7 @@ class TurnForceRows:
         """
         columns = self.known.state.columns
         count = np.bincount(columns, minlength=len(values))
-        out: Array = (values / np.maximum(count, 1))[columns]
-        return out
+        return (values / np.maximum(count, 1))[columns]
 
     def _output_means(self, outputs: Array) -> Array:
         """Means over the pieces, by outputs at their edges, (k, 3, columns), (2)."""
@@ -159,17 +157,13 @@ class TurnForceRows:
         )
         for c in range(3):
             cov[c::3, c::3] += walks[c]
-        out: Array = cov + np.kron(course, np.diag(loose**2))
-        return out
+        return cov + np.kron(course, np.diag(loose**2))
 
 
-def turn_force_columns(
-    columns: Index, dictionary: Dictionary, known: Set
-) -> NDArray[np.bool_]:
+def turn_force_columns(columns: Index, dictionary: Dictionary, known: Set) -> Mask:
     """Columns used during turns: no window shows them, or the windows' set has them."""
     held = np.isin(columns, known.state.columns)
-    out: NDArray[np.bool_] = held | ~dictionary.shown[columns]
-    return out
+    return held | ~dictionary.shown[columns]
 
 
 def settling_amplitudes(state: State, x: Experience, since: Array) -> Array:
@@ -195,5 +189,4 @@ def _settling_covariance(x: Experience, since: Array, middle: Array) -> Array:
         priors.BUILD_UP_AT_END,
     )
     apart = np.subtract.outer(middle, middle) / priors.BUILD_UP_S
-    out: Array = np.outer(unsure, unsure) * np.exp(-(apart**2) / 2)
-    return out
+    return np.outer(unsure, unsure) * np.exp(-(apart**2) / 2)

@@ -30,15 +30,11 @@ from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
 from fieldcal.model.system.turn_force_rows import TurnForceRows, settling_amplitudes
-from fieldcal.model.system.window_ends import WindowEnds
-from fieldcal.model.turns.attitude import closures, first_row_of_each, turn_geometry
+from fieldcal.model.system.window_ends import WindowEnds, closure_slopes, output_slopes
+from fieldcal.model.turns.attitude import turn_geometry
 from fieldcal.model.turns.turn import Turn
 from fieldcal.model.turns.turn_tracker import TurnTracker, apply_way_effects
-from fieldcal.physics.experience import Experience
 from fieldcal.physics.experience_rows import select_rows
-
-FORCE_STEP = 1e-3
-"""Step of the force for a derivative, m/s^2."""
 
 MAX_WAY_CHI2 = 3.0
 """Mean square of a row on the way, after a fit of all columns, above which a hand shook
@@ -87,12 +83,7 @@ class TurnRows:
 class Turns:
     """Makes rows of the turns of a recording.
 
-    Parameters
-    ----------
-    turning : integrates the turns
-    dictionary : columns
-    way : whether the accelerometers during turns are used
-
+    `way` states whether the accelerometers during turns are used.
     """
 
     def __init__(self, turning: TurnTracker, dictionary: Dictionary, way: bool) -> None:
@@ -131,7 +122,7 @@ class Turns:
         if self.dictionary.unoriented.any():
             self.windows = WindowEnds.of(windows, self.dictionary)
             x, since = select_rows(self.rows.x, self.first), self.dictionary.since
-            self.slopes = _output_slopes(state, x, since[:, self.first])
+            self.slopes = output_slopes(state, x, since[:, self.first])
         turns = list(self.tracker.turns(state))
         views = [self._view(turn, state) for turn in turns]
         met = columns_of_turns(turns, views, self.dictionary, self.at_ends, self.known)
@@ -177,12 +168,12 @@ class Turns:
             turn.ends, turn.positions, turn.attitude, turn.done
         )
         index, close, general = met.index, met.closing, met.general
-        loose = dict(self._loose_ends(turn)) if d.unoriented.any() else {}
-        ends: Array = (
-            np.zeros((3, 3))
-            if turn.rounding_covariance is None
-            else turn.rounding_covariance
-        )
+        loose: dict[int, Array] = {}
+        if d.unoriented.any():
+            loose = dict(closure_slopes(turn, d.window_positions, self.slopes))
+        ends: Array = np.zeros((3, 3))
+        if turn.rounding_covariance is not None:
+            ends = turn.rounding_covariance
         for last, (p, bent) in zip((True, False), loose.items(), strict=False):
             # the force there is the measured one, which may differ from the state's
             off = self.windows.residual_at(p, last, values)
@@ -226,46 +217,13 @@ class Turns:
         white = self.rows.noise[3:] / scale * np.sqrt(turn.interval)
         fading = settling_amplitudes(view.state, turn.x, view.since)[3:] / scale
         built_up = priors.BUILD_UP_ON_WAY * length * float(np.abs(fading).max())
-        earth = (
-            EARTH_RATE / 3**0.5 * length if self.dictionary.unoriented.any() else 0.0
-        )
         walked = float((white**2).mean()) * length
-        return (
-            walked
-            + turn.closure_sigma**2
-            + built_up**2
-            + earth**2
-            + self._hand_variance(turn)
-        )
-
-    def _hand_variance(self, turn: Turn) -> float:
-        """Variance of a hand's rotation at both ends, if angles are known, rad^2."""
+        known = walked + turn.closure_sigma**2 + built_up**2
         if self.dictionary.unoriented.any():
-            return 0.0
+            return known + (EARTH_RATE / 3**0.5 * length) ** 2
+        # what a hand turns the device by, at either end
         ends = np.searchsorted(self.dictionary.window_positions, turn.positions)
-        return float((self.wander[ends] ** 2).mean(axis=1).sum())
-
-    def _loose_ends(self, turn: Turn) -> Iterator[tuple[int, Array]]:
-        """Derivatives of the closure by accelerometer errors at its ends, (3, 3) each.
-
-        In a position of unknown orientation such an error rotates the force that is
-        derived from them: df = -(1 - n n^T) (dU/df)^-1 dU.
-        """
-        ends = turn.ends
-        rows = first_row_of_each(ends, turn.positions)
-        forces, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
-        for i, p in enumerate(turn.positions):
-            j = int(np.searchsorted(self.dictionary.window_positions, p))
-            up = forces[i] / np.linalg.norm(forces[i])
-            across = (np.eye(3) - np.outer(up, up)) @ np.linalg.inv(self.slopes[j])
-            step = 1e-4 * float(np.linalg.norm(forces[i]))
-            sides = []
-            for sign in (1.0, -1.0):
-                f = np.repeat(forces[None], 3, axis=0)
-                f[:, i] += sign * step * np.eye(3)
-                sides.append(closures(f, held, turn.attitude[-1])[0])
-            bent = (sides[0] - sides[1]).T / (2 * step)
-            yield j, -bent @ across
+        return known + float((self.wander[ends] ** 2).mean(axis=1).sum())
 
 
 def _has_unknown_acc_cause(known: Set) -> bool:
@@ -282,33 +240,13 @@ def _has_unknown_acc_cause(known: Set) -> bool:
 def _known_axes(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:
     """Known axes of a closure: orthonormal rows, (2 or 3, 3), and their information.
 
-    Parameters
-    ----------
-    across : (3, 3) projection on the known part
-    ends : (3, 3) covariance from the forces at both ends, rad^2
-    alike : further variance, the same about all axes, rad^2
-
+    `across` (3, 3) projects on the known part; `ends` (3, 3) is the covariance from the
+    forces at both ends, `alike` further variance about all axes, rad^2.
     """
     values, axes = np.linalg.eigh(across)
     plane: Array = axes[:, values > 0.5].T
     spread, turned = np.linalg.eigh(plane @ ends @ plane.T)
     return turned.T @ plane, 1 / (np.maximum(spread, 0.0) + alike)
-
-
-def _output_slopes(state: State, x: Experience, since: Array) -> Array:
-    """Derivative of the accelerometers' outputs by the force in each row, (p, 3, 3).
-
-    It contains cross-coupling and nonlinearity.
-    """
-    inputs, out = state.experienced(x), np.zeros((len(x), 3, 3))
-    for c in range(3):
-        step = FORCE_STEP * np.eye(3)[c]
-        up, down = (
-            state.output(replace(inputs, f=inputs.f + s * step), since)[:, :3]
-            for s in (1.0, -1.0)
-        )
-        out[:, :, c] = (up - down) / (2 * FORCE_STEP)
-    return out
 
 
 def _drop_shaken_way(rows: list[TurnRows]) -> list[TurnRows]:
@@ -326,7 +264,5 @@ def _drop_shaken_way(rows: list[TurnRows]) -> list[TurnRows]:
     rest = white - used @ np.linalg.lstsq(used, white, rcond=1e-9)[0]
     if float(rest @ rest) <= MAX_WAY_CHI2 * max(size - used.shape[1], 1):
         return rows
-    return [
-        replace(r, way=np.zeros(0), way_design=np.zeros((0, len(r.columns))))
-        for r in rows
-    ]
+    none = np.zeros(0)
+    return [replace(r, way=none, way_design=r.way_design[:0]) for r in rows]

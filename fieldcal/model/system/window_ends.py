@@ -9,15 +9,22 @@ off. (p,) are windows, (k,) columns of the dictionary.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
+from fieldcal.model.turns.attitude import closures, first_row_of_each
+from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.attitude_step import AttitudeStep
+from fieldcal.physics.experience import Experience
+
+FORCE_STEP = 1e-3
+"""Step of the force for a derivative, m/s^2."""
 
 
 @dataclass(frozen=True)
@@ -86,3 +93,45 @@ def _columns_that_turn_the_device(d: Dictionary) -> Index:
         if isinstance(group.effect, AttitudeStep) and group.effect.turns_device
     ]
     return np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *found]))
+
+
+def output_slopes(state: State, x: Experience, since: Array) -> Array:
+    """Derivative of the accelerometers' outputs by the force in each row, (p, 3, 3).
+
+    It contains cross-coupling and nonlinearity.
+    """
+    inputs, out = state.experienced(x), np.zeros((len(x), 3, 3))
+    for c in range(3):
+        step = FORCE_STEP * np.eye(3)[c]
+        up, down = (
+            state.output(replace(inputs, f=inputs.f + s * step), since)[:, :3]
+            for s in (1.0, -1.0)
+        )
+        out[:, :, c] = (up - down) / (2 * FORCE_STEP)
+    return out
+
+
+def closure_slopes(
+    turn: Turn, positions: Index, slopes: Array
+) -> Iterator[tuple[int, Array]]:
+    """Derivatives of a closure by accelerometer errors at the turn's ends, (3, 3) each.
+
+    In a position of unknown orientation such an error rotates the force that is derived
+    from them: df = -(1 - n n^T) (dU/df)^-1 dU. `slopes` (p, 3, 3) are those of
+    `output_slopes` for the windows' `positions` (p,). With the numbers of the windows.
+    """
+    ends = turn.ends
+    rows = first_row_of_each(ends, turn.positions)
+    forces, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
+    for i, p in enumerate(turn.positions):
+        j = int(np.searchsorted(positions, p))
+        up = forces[i] / np.linalg.norm(forces[i])
+        across = (np.eye(3) - np.outer(up, up)) @ np.linalg.inv(slopes[j])
+        step = 1e-4 * float(np.linalg.norm(forces[i]))
+        sides = []
+        for sign in (1.0, -1.0):
+            f = np.repeat(forces[None], 3, axis=0)
+            f[:, i] += sign * step * np.eye(3)
+            sides.append(closures(f, held, turn.attitude[-1])[0])
+        bent = (sides[0] - sides[1]).T / (2 * step)
+        yield j, -bent @ across

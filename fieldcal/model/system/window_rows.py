@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
-from fieldcal.model.causes.basis import Course, RowView
+from fieldcal.core.samples import GYR, Array, Index, Mask
+from fieldcal.model.causes.basis import RowView
+from fieldcal.model.causes.cause import Basis
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
-from fieldcal.model.system.linear_system import (
-    MIN_VISIBLE_SIGMAS,
-    Parts,
-    System,
-    append_course,
-)
+from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.starting_angles import starting_angles
 
 MIN_VISIBLE_ACC = 1e-6
@@ -28,14 +23,7 @@ m/s^2."""
 
 
 class WindowSystem(System):
-    """Rows of the windows and a dictionary, linearised about states.
-
-    Parameters
-    ----------
-    rows : of the windows
-    dictionary : their columns
-
-    """
+    """Rows of windows, and a dictionary of their columns, linearised about states."""
 
     def __init__(self, rows: Rows, dictionary: Dictionary) -> None:
         super().__init__(dictionary)
@@ -45,23 +33,10 @@ class WindowSystem(System):
         """The same rows with a copy of the dictionary."""
         return type(self)(self.rows, self.dictionary.independent_copy())
 
-    def linearised(
-        self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[LinearRows]:
-        """Rows of every channel about a state, with all columns or those wanted."""
-        d = self.dictionary
-        view = RowView.of(self.rows.x, d.since, state)
-        off = self.rows.y - state.output(view.x, d.since)
-        asked = np.ones(d.width, bool) if wanted is None else wanted
-        parts = self._parts(view, asked)
-        out = [
-            self._channel(c, channel_parts, off[:, c])
-            for c, channel_parts in parts.items()
-        ]
-        if wanted is None:
-            for part in out:
-                d.shown[part.columns] |= self._shows(part)
-        return out
+    @property
+    def used(self) -> Mask:
+        """Rows with a value, by channel, (n, 6)."""
+        return self.rows.used
 
     def linearisation_error(self, state: State, other: State, step: Array) -> float:
         """Largest error of the means at another state, linearised about a state, σ.
@@ -86,51 +61,31 @@ class WindowSystem(System):
         """Turn of a position to where its mean force is, (2,) rad; zero if near."""
         return starting_angles(self.rows, nominal, position)
 
-    def _parts(self, view: RowView, wanted: NDArray[np.bool_]) -> Parts:
-        """Wanted columns with influence on each channel."""
-        parts: Parts = {c: [] for c in self.dictionary.observed.tolist()}
-        for first, end, basis in self.dictionary.basis_ranges():
-            at, kept = np.arange(first, end), wanted[first:end]
-            if not kept.any():
-                continue
-            table = basis.evaluate(view)
-            if isinstance(basis, Course):
-                append_course(parts, at, table, kept)
-                continue
-            if not kept.all():
-                at, table = at[kept], table[:, :, kept]
-            touched = table != 0.0
-            for c, channel_parts in parts.items():
-                shown = (touched[:, c] & self.rows.used[:, c, None]).any(axis=0)
-                if shown.any():
-                    channel_parts.append((at[shown], table[:, c, shown]))
-        return parts
+    def _about(self, state: State) -> tuple[Callable[[Basis], Array], Array]:
+        """What evaluates a basis about a state; recorded less calculated, (n, 6)."""
+        view = RowView.of(self.rows.x, self.dictionary.since, state)
+        off = self.rows.y - state.output(view.x, view.since)
+        return (lambda basis: basis.evaluate(view)), off
 
-    def _channel(
-        self, c: int, parts: Sequence[tuple[Index, Array]], off: Array
+    def _whitened(
+        self, channel: int, columns: Index, table: Array, off: Array
     ) -> LinearRows:
-        """One channel's rows, whitened."""
+        """Rows of a channel with columns (k,), of a table (n, k) and residuals (n,)."""
         rows, d = self.rows, self.dictionary
-        use = np.flatnonzero(rows.used[:, c])
-        left = d.wander.residual_variance_of_rows(rows.length, c)[use]
-        weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
-        design = np.hstack([table[use] for _, table in parts]) * weight[:, None]
-        columns = np.concatenate([at for at, _ in parts])
+        use = np.flatnonzero(rows.used[:, channel])
+        left = d.wander.residual_variance_of_rows(rows.length, channel)[use]
+        weight = 1 / np.sqrt(rows.sd[use, channel] ** 2 + left)
+        design, white = table[use] * weight[:, None], off[use] * weight
         window = np.searchsorted(d.window_positions, rows.x.position[use])
-        return LinearRows(c, use, window, weight, columns, design, off[use] * weight)
+        return LinearRows(channel, use, window, weight, columns, design, white)
 
-    def _shows(self, part: LinearRows) -> NDArray[np.bool_]:
+    def _shows(self, part: LinearRows) -> Mask:
         """Whether each column of a channel shows at its typical size, (k,).
 
         Gyroscopes measure the Earth's rate, so there it must exceed the noise.
         """
-        table = np.abs(part.design) * self.dictionary.typical[part.columns]
-        if part.channel < 3:
-            visible: NDArray[np.bool_] = (table / part.weight[:, None]).max(
-                axis=0
-            ) > MIN_VISIBLE_ACC
-            return visible
-        stands_out: NDArray[np.bool_] = (
-            np.linalg.norm(table, axis=0) > MIN_VISIBLE_SIGMAS
-        )
-        return stands_out
+        if part.channel >= GYR.start:
+            return super()._shows(part)
+        size = (np.abs(part.design) / part.weight[:, None]).max(axis=0)
+        shows: Mask = size * self.dictionary.typical[part.columns] > MIN_VISIBLE_ACC
+        return shows

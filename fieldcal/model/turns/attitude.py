@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross
 from fieldcal.core.running_integral import running_integral
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
 
@@ -26,12 +25,11 @@ MAX_MISCLOSURE_RAD = 0.3
 were clipped, or that the device was turned otherwise than its positions say."""
 
 
-def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
+def trapezoid_means(t: Array, values: Array, cut: Index) -> Array:
     """Means (k, ...) between indices cut (k + 1,) of values (n, ...) at instants t."""
     total = running_integral(t, values)
     length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
-    mean: Array = np.diff(total[cut], axis=0) / length
-    return mean
+    return np.diff(total[cut], axis=0) / length
 
 
 def interpolate_vectors(
@@ -144,7 +142,7 @@ def first_row_of_each(x: Experience, positions: Iterable[int]) -> Index:
     return np.array([int(np.argmax(x.position == p)) for p in positions])
 
 
-def closures(f: Array, held: Array, end: Array) -> tuple[Array, NDArray[np.bool_]]:
+def closures(f: Array, held: Array, end: Array) -> tuple[Array, Mask]:
     """Closures phi_T in device axes at p, and whether all components are known.
 
     Parameters

@@ -15,9 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.turns.attitude import interpolate_vectors
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
@@ -78,14 +77,13 @@ class Steps:
     first: int
     t: Array
     each: int
-    edge: NDArray[np.intp]
-    cut: NDArray[np.intp]
+    edge: Index
+    cut: Index
 
     @property
     def at(self) -> Array:
         """Instants of the edges, s."""
-        times: Array = self.t[self.edge]
-        return times
+        return self.t[self.edge]
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,5 +155,4 @@ def _angular_rates(leg: Leg, t: Array, known_errors: Array) -> Array:
     span = slice(max(first - n, 0), first + 2 * n)
     delayed = t + leg.delay
     measured = [np.interp(delayed, block.t[span], g) for g in block.gyr[span].T]
-    rate: Array = (np.stack(measured, axis=1) - leg.bias - known_errors) / leg.scale
-    return rate
+    return (np.stack(measured, axis=1) - leg.bias - known_errors) / leg.scale

@@ -20,14 +20,13 @@ within a step (3); P. G. Savage 1998, for coning.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross, rotation_matrices
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 
 
-def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
+def small_turns(t: Array, w: Array, edge: Index) -> Array:
     """Rotation vectors q (m, 3), rad, of the steps between the edges, (3).
 
     `t` (n,) s and `w` (n, 3) rad/s are samples; `edge` (m + 1,) indices of them.
@@ -36,8 +35,7 @@ def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
         (np.diff(t)[:, None] * mean_rates(t, w))[: edge[-1]], edge[:-1], axis=0
     )
     coning = cross(w[edge[:-1]], w[edge[1:]])
-    turns: Array = total + np.diff(t[edge])[:, None] ** 2 / 12 * coning
-    return turns
+    return total + np.diff(t[edge])[:, None] ** 2 / 12 * coning
 
 
 def mean_rates(t: Array, w: Array) -> Array:

@@ -25,9 +25,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Block, Index
+from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model.rows.noise import quantisation_steps, rounding_sigma
 from fieldcal.windows.dead_band import dead_bands
 
@@ -64,8 +63,7 @@ class StandingOutputs:
         kernel = np.ones(step_samples) / step_samples
         smooth = np.column_stack([np.convolve(c, kernel, "same") for c in at_value.T])
         inside = np.convolve(np.ones(len(at_value)), kernel, "same")
-        out: Array = smooth[edge] / inside[edge][:, None]
-        return out
+        return smooth[edge] / inside[edge][:, None]
 
     def closure_covariance(
         self, t: Array, gyr: Array, scale: Array, edge: Index, attitude: Array
@@ -95,10 +93,9 @@ class StandingOutputs:
             out += np.einsum("r,ri,rj->ij", variance, axis, axis)
         return out
 
-    def _at_window_value(self, gyr: Array) -> NDArray[np.bool_]:
+    def _at_window_value(self, gyr: Array) -> Mask:
         """Whether each output (n, 3) has the value of the windows, (n, 3)."""
-        found: NDArray[np.bool_] = np.abs(gyr - self.value) < MAX_STEP_PART * self.step
-        return found
+        return np.abs(gyr - self.value) < MAX_STEP_PART * self.step
 
 
 def _run_factor(value: Array, length: Array) -> Array:
@@ -111,7 +108,7 @@ def _run_factor(value: Array, length: Array) -> Array:
 
 
 def find_standing_outputs(
-    block: Block, windows: NDArray[np.intp], shared_error: Array
+    block: Block, windows: Index, shared_error: Array
 ) -> StandingOutputs | None:
     """Values of the gyroscopes in the windows; None if no output keeps its value.
 

@@ -28,10 +28,7 @@ from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross
 from fieldcal.core.running_integral import running_integral
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.turns.attitude import (
-    trapezoid_means,
-    turn_geometry,
-)
+from fieldcal.model.turns.attitude import trapezoid_means, turn_geometry
 from fieldcal.physics.experience import Experience
 
 
@@ -109,8 +106,7 @@ class Turn:
         seconds = np.zeros(len(self.x.t))  # that each edge stands for, trapezoid rule
         seconds[:-1] += steps / 2
         seconds[1:] += steps / 2
-        out: Array = np.moveaxis(self.attitude, 2, 0) * seconds[:, None] / scale
-        return out
+        return np.moveaxis(self.attitude, 2, 0) * seconds[:, None] / scale
 
     def attitude_error(self, rate_error: Array) -> Array:
         """Attitude errors phi - u phi_T at the edges, (m + 1, 3, k) rad.

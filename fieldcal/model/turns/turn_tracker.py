@@ -11,9 +11,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Mask
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
@@ -30,6 +29,7 @@ from fieldcal.model.turns.attitude import (
 from fieldcal.model.turns.integration import (
     IntegratedTurn,
     Leg,
+    Steps,
     divide_into_steps,
     integrate_turn,
 )
@@ -85,10 +85,8 @@ class TurnTracker:
         rows, x = self.rows, self.rows.x
         if not rows.used.any(axis=0).all():
             return
-        windows, held = (
-            window_bounds(self.source.block, self.source.about),
-            np.unique(x.position),
-        )
+        windows = window_bounds(self.source.block, self.source.about)
+        held = np.unique(x.position)
         for p, q in zip(held[:-1].tolist(), held[1:].tolist(), strict=True):
             if x.rate[np.isin(x.position, (p, q))].any():
                 continue
@@ -121,17 +119,7 @@ class TurnTracker:
         leg = Leg(self.source, ends, bias, scale, delay, pair, a, b)
         if (steps := divide_into_steps(leg)) is None:
             return None
-        correction: Array = np.zeros((len(steps.edge), 3))
-        for _ in range(MAX_CORRECTIONS):
-            integrated = integrate_turn(leg, steps, correction)
-            x = self._edges(ends, steps.at, pair, integrated, steps.edge)
-            force_before_effects, x = x.f, apply_way_effects(x, state)
-            before, correction = (
-                correction,
-                other_gyro_errors(state, x, self.time_since_turn(steps.at, pair[1])),
-            )
-            if np.abs(correction - before).max() * float(np.ptp(steps.at)) < 1e-6:
-                break
+        integrated, force_before_effects, x = self._corrected(leg, steps, state)
         end = integrated.attitude[-1]
         if contradicts_force(ends, pair, end):
             self.contradicted_turns.append(pair)
@@ -161,6 +149,25 @@ class TurnTracker:
             ),
         )
 
+    def _corrected(
+        self, leg: Leg, steps: Steps, state: State
+    ) -> tuple[IntegratedTurn, Array, Experience]:
+        """A turn integrated without the state's other gyroscope errors.
+
+        With the force at its edges before the effects that act during turns, (m + 1,
+        3), and the inputs there with them.
+        """
+        correction: Array = np.zeros((len(steps.edge), 3))
+        for _ in range(MAX_CORRECTIONS):
+            integrated = integrate_turn(leg, steps, correction)
+            x = self._edges(leg, steps, integrated)
+            force_before_effects, x = x.f, apply_way_effects(x, state)
+            before, since = correction, self.time_since_turn(steps.at, leg.pair[1])
+            correction = other_gyro_errors(state, x, since)
+            if np.abs(correction - before).max() * float(np.ptp(steps.at)) < 1e-6:
+                break
+        return integrated, force_before_effects, x
+
     def time_since_turn(self, t: Array, q: int) -> Array:
         """Time (o, n), s, since the turn to window q at instants t (n,), by origin.
 
@@ -170,24 +177,14 @@ class TurnTracker:
         first_row = int(np.argmax(x.position == q))
         turn_end = x.t[first_row] - self.since[:, first_row]
         since = t - turn_end[:, None]
-        out: Array = np.where(since >= 0, since, np.inf)
-        return out
+        return np.where(since >= 0, since, np.inf)
 
-    def _edges(
-        self,
-        ends: Experience,
-        t: Array,
-        pair: tuple[int, int],
-        integrated: IntegratedTurn,
-        edge: Index,
-    ) -> Experience:
-        """Inputs of the device at the edges of the steps, by the gyroscopes.
-
-        `t` (m + 1,) are the instants of the edges, `edge` their samples in the turn.
-        """
+    def _edges(self, leg: Leg, steps: Steps, integrated: IntegratedTurn) -> Experience:
+        """Inputs of the device at the edges of the steps, by the gyroscopes."""
+        ends, pair, t = leg.x, leg.pair, steps.at
         attitude, done = integrated.attitude, integrated.done
         f, _, _ = turn_geometry(ends, pair, attitude, done)
-        w = integrated.rate[edge]
+        w = integrated.rate[steps.edge]
         held = ends.to_device[first_row_of_each(ends, pair)]
         warming, heating = self.source.thermometer.at(t)
         unknown = np.full(len(t), np.nan)
@@ -205,7 +202,7 @@ class TurnTracker:
 
 def _without_lost_samples(source: RowSource) -> RowSource:
     """The source with complete samples only, if some between windows are unusable."""
-    unusable: NDArray[np.bool_] = ~np.all(source.usable, axis=1)
+    unusable: Mask = ~np.all(source.usable, axis=1)
     for first, last in window_bounds(source.block, source.about):
         unusable[first:last] = False
     return source.complete_samples if unusable.any() else source
@@ -227,5 +224,4 @@ def other_gyro_errors(state: State, x: Experience, since: Array) -> Array:
     """
     terms = tuple(t for t in state.terms if not t.effect.lag(t.values).delay)
     outputs = replace(state, terms=terms).output(x, since)
-    out: Array = outputs[:, 3:] - state.bias[3:] - state.scale[3:] * x.w
-    return out
+    return outputs[:, 3:] - state.bias[3:] - state.scale[3:] * x.w

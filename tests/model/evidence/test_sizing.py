@@ -23,12 +23,12 @@ from fieldcal.model.evidence.sizing import (
     instability_log_prior,
 )
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.instabilities import (
+from fieldcal.model.search.set_at_instability import (
     INSTABILITY_STEPS_DOWN,
     LOWERED_TOGETHER,
     lowered_instability,
+    with_typical_calibration,
 )
-from fieldcal.model.search.set_at_instability import with_typical_calibration
 
 SET = np.array([0, 3, 4, 7])
 KEYS = ("angle_offset", "bias_drift:gyr", "alpha:ay")

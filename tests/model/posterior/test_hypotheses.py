@@ -77,7 +77,7 @@ def test_nobody_who_looked_for_causes_doubts_windows() -> None:
     np.testing.assert_allclose(np.exp(INSTABILITY_LOG_DENSITY), priors.density(8.0))
     assert not found.run().bad.any() and asked.run().bad.any()
     assert len(asked.doubted) == 9
-    for i, at in asked.doubted:
+    for i, at in enumerate(asked.doubted):
         expected = [D.window_columns(c)[i] for c in range(3)]
         assert at.tolist() == expected
     hypotheses = asked._triad_hypotheses((3, 4, 5))

@@ -24,8 +24,8 @@ SD = 1e-3
 PLACES = tuple(
     Position.deg(a, b) for a, b in [(0, 0), (60, 20), (-50, 40), (20, -70), (150, 10)]
 )
-WIDE = priors.FREE_SIZE * np.array([priors.BIAS_ACC] * 3 + [priors.SCALE] * 3)
-UNSTABLE = priors.INSTABILITY_ACC
+WIDE = priors.FREE_SIZE * np.append(priors.BIAS[:3], [priors.SCALE] * 3)
+UNSTABLE = priors.INSTABILITY[0]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def case(off: Array, places: tuple[Position, ...] = PLACES) -> Case:
     there = sets.evaluate(())
     found = Mixing(d, gram, there, sets.typical_instability).run()
     names = [f"acc_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
-    assert found.columns.tolist() == [int(d.columns_for(n)[0]) for n in names]
+    assert found.columns.tolist() == [d.column_by_name[n] for n in names]
     design = np.zeros((len(places), 3, 6))
     for c in range(3):
         design[:, c, c], design[:, c, 3 + c] = 1.0, perfect[:, c]
@@ -105,7 +105,7 @@ def hypotheses(one: Case) -> list[tuple[float, int, Array]]:
         for i in range(n):
             for v in range(33):
                 push = np.zeros((n, 3))
-                push[i] = (priors.SIZES[v] * priors.UNKNOWN_ACC) ** 2
+                push[i] = (priors.SIZES[v] * priors.UNKNOWN[0]) ** 2
                 chance = np.log(priors.BAD_WINDOW_CHANCE) + steep(priors.SIZE_TAIL)[v]
                 bad = cov + np.diag(push.ravel())
                 out.append((known(sizes) + float(chance), i, bad))

@@ -19,9 +19,9 @@ from fieldcal.model.posterior.model_average import (
     ModelAverage,
     average_of_columns,
     average_over_sets,
+    average_over_sizes,
 )
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.variations import visit_variations
 

@@ -21,8 +21,8 @@ from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import Mixing
+from fieldcal.model.posterior.model_average import average_over_sizes
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.set_at_instability import with_typical_calibration

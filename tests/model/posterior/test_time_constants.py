@@ -10,8 +10,11 @@ from small_sessions import LADDER, SD, dictionary, ladder, nominal, rows_of
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.posterior.common_axes import pick_columns
-from fieldcal.model.posterior.model_average import average_of_columns, average_over_sets
-from fieldcal.model.posterior.size_average import average_over_sizes
+from fieldcal.model.posterior.model_average import (
+    average_of_columns,
+    average_over_sets,
+    average_over_sizes,
+)
 from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult

@@ -10,7 +10,7 @@ import pytest
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Block
 from fieldcal.model.rows.averages import Rows
-from fieldcal.model.rows.means import median_sigma, rows_of_means
+from fieldcal.model.rows.reduce import median_sigma, rows_of_means
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description_file import parse_description

@@ -20,9 +20,8 @@ from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult, resume
-from fieldcal.model.search.offer import OfferTable
-from fieldcal.model.search.offered_pairs import offered_pairs
-from fieldcal.model.search.offers import Offers
+from fieldcal.model.search.offers import Offers, OfferTable
+from fieldcal.model.search.pairs import offered_pairs
 from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State, Term

@@ -14,7 +14,7 @@ from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search import offers
 from fieldcal.model.search.group_gains import GroupGains
-from fieldcal.model.search.offer import Offer
+from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.selection import PREDICTION_SLACK, Search
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "cross_coupling", "settling:acc",

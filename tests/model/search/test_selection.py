@@ -18,7 +18,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.offer import Offer
+from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.pairs import pair_gains
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.variations import widen_outputs

@@ -11,7 +11,8 @@ import pytest
 
 from benchmarks.hand_held.draws import GRAVITY, log
 from fieldcal.cli import main
-from fieldcal.diagnosis.explain import Explanation, build_fit, explain
+from fieldcal.diagnosis.explain import Explanation, explain
+from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes
@@ -65,7 +66,7 @@ def test_the_state_stays_where_the_set_does() -> None:
 def test_how_a_position_lies_moves_no_closure() -> None:
     """It is read from accelerometers, whatever they couple, bend or are biased by."""
     one = prepared(88_000_045)
-    own = build_fit(one.source, one.rows, one)
+    own = build_fit(one)
     there = {c.key: c for c in own.dictionary.causes}
     state, values, _ = own.settle(own.nominal, np.zeros(own.dictionary.width), ())
     members = tuple((there[key], there[key].variants[0]) for key in sorted(EVERY))

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.concealed import kinds
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.explain import build_fit
+from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
@@ -35,7 +35,7 @@ def test_all_turns_at_once_are_each_by_itself(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(turn_rows, "columns_of_turns", both)
     session = kinds()["gyro_scale"][0](np.random.default_rng(3))
     prepared = prepare_recording(session.record(3), session.about)
-    fit = build_fit(prepared.source, prepared.rows, prepared)
+    fit = build_fit(prepared)
     (scale,) = [c for c in fit.dictionary.causes if c.key == "gyro_scale"]
     nothing = np.zeros(fit.dictionary.width)
     for members in ((), ((scale, scale.variants[0]),)):

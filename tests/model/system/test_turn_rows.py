@@ -63,20 +63,6 @@ def test_a_way_that_a_hand_shook_says_nothing(size: float, kept: bool) -> None:
     assert turn_rows._drop_shaken_way([]) == []
 
 
-def test_outputs_change_with_the_force_by_all_that_reads_it() -> None:
-    """By scale factors, what is coupled from other axes, and curvature."""
-    k2, coupling = np.array([2e-3, -3e-3, 1e-3]), np.linspace(-0.02, 0.03, 6)
-    terms = Term(EFFECTS["quadratic"], k2), Term(EFFECTS["cross_coupling"], coupling)
-    scale = np.linspace(0.9, 1.2, 6)
-    state = replace(nominal(), bias=np.full(6, 0.5), scale=scale, terms=terms)
-    k12, k13, k21, k23, k31, k32 = coupling
-    whole = np.array([[0.9, k12, k13], [k21, 0.96, k23], [k31, k32, 1.02]])
-    found = turn_rows._output_slopes(state, X, X.since_turn[None])
-    for slope, f in zip(found, X.f, strict=True):
-        expected = whole + 2 * np.diag(k2 * f)
-        np.testing.assert_allclose(slope, expected, atol=1e-8)
-
-
 def test_what_no_physics_makes_of_accelerometers_at_rest_is_strange() -> None:
     d = dictionary(X)
     linear = WindowSystem(rows_of(X, np.hstack([X.f, X.w])), d).linearised(nominal())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,13 @@ import pytest
 from small_sessions import SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
+from fieldcal.effects import catalogue
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.system.window_ends import WindowEnds
+from fieldcal.model.state import Term
+from fieldcal.model.system.window_ends import WindowEnds, output_slopes
 from fieldcal.model.system.window_rows import WindowSystem
 
+EFFECTS = catalogue()
 X = ladder()
 RNG = np.random.default_rng(8)
 
@@ -76,3 +80,17 @@ def test_a_base_that_is_knocked_goes_with_the_turn_from_the_row_at_its_end(
                 expected_off = found.residuals[p, c] + there @ values
                 assert off == pytest.approx(expected_off)
     assert amid, "some instant lies within a window"
+
+
+def test_outputs_change_with_the_force_by_all_that_reads_it() -> None:
+    """By scale factors, what is coupled from other axes, and curvature."""
+    k2, coupling = np.array([2e-3, -3e-3, 1e-3]), np.linspace(-0.02, 0.03, 6)
+    terms = Term(EFFECTS["quadratic"], k2), Term(EFFECTS["cross_coupling"], coupling)
+    scale = np.linspace(0.9, 1.2, 6)
+    state = replace(nominal(), bias=np.full(6, 0.5), scale=scale, terms=terms)
+    k12, k13, k21, k23, k31, k32 = coupling
+    whole = np.array([[0.9, k12, k13], [k21, 0.96, k23], [k31, k32, 1.02]])
+    found = output_slopes(state, X, X.since_turn[None])
+    for slope, f in zip(found, X.f, strict=True):
+        expected = whole + 2 * np.diag(k2 * f)
+        np.testing.assert_allclose(slope, expected, atol=1e-8)

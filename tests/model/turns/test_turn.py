@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import build_fit
+from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.basis import RowView
 from fieldcal.model.causes.cause import Group
@@ -121,7 +121,7 @@ def followed(
         about = replace(about, nominal={**about.nominal, **scaled})
         block = block.with_six(block.six * unit)
     prepared = prepare_recording(block, about)
-    fit = build_fit(prepared.source, prepared.rows, prepared)
+    fit = build_fit(prepared)
     d, at_rest = fit.dictionary, np.zeros(fit.dictionary.width)
     linear = fit.system.linearised(fit.nominal)
     known = Sets(d, gram(linear, d, at_rest)).evaluate(())
@@ -368,7 +368,7 @@ def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
     ]
     about = {"format": 1, "position": places, "nominal": {"gyr_scale": [2.0] * 3}}
     prepared = prepare_recording(block, parse_description(about))
-    fit = build_fit(prepared.source, prepared.rows, prepared)
+    fit = build_fit(prepared)
     d, at_rest = fit.dictionary, np.zeros(fit.dictionary.width)
     linear = fit.system.linearised(fit.nominal)
     assert fit.turns is not None and not d.unoriented.any()
@@ -495,7 +495,7 @@ def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
     prepared = prepare_recording(
         block, parse_description({"format": 1, "position": places})
     )
-    fit = build_fit(prepared.source, prepared.rows, prepared)
+    fit = build_fit(prepared)
     d, at_rest = fit.dictionary, np.zeros(fit.dictionary.width)
     linear = fit.system.linearised(fit.nominal)
     assert fit.turns is not None and d.unoriented.all()

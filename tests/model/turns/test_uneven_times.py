@@ -7,7 +7,7 @@ import pytest
 import strapdown
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import build_fit
+from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.turns.attitude import accelerations
 from fieldcal.model.turns.rotation import small_turns
@@ -55,7 +55,7 @@ def test_a_turn_by_arrivals_does_not_contradict_its_positions() -> None:
          "position": strapdown.schedule()}
     )  # fmt: skip
     prepared = prepare_recording(Block.of(t, table[:, 1:4], table[:, 4:]), about)
-    fit = build_fit(prepared.source, prepared.rows, prepared)
+    fit = build_fit(prepared)
     assert fit.turns is not None
     tracker = fit.turns.tracker
     turns = list(tracker.turns(fit.nominal))

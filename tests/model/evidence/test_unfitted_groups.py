@@ -12,7 +12,7 @@ from fieldcal.core.factory import FactoryErrors
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.eliminated import Eliminated
-from fieldcal.model.evidence.two_grades import chances_of_coarser
+from fieldcal.model.evidence.unfitted_groups import chances_of_coarser
 
 SET = np.array([0, 3, 4, 7])
 SIZES = np.array([0.7, 2.0, 1.0, 0.5])

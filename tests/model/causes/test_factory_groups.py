@@ -9,7 +9,7 @@ from small_sessions import LADDER, G, dictionary, ladder, nominal
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.hysteresis import hysteresis
+from fieldcal.model.causes.factory_groups import hysteresis
 from fieldcal.physics.experience import Experience
 
 

@@ -1,0 +1,85 @@
+"""Biases and scale factors at the end of a recording, where its effects change them.
+
+They are given at the temperature of the last window and with the device at rest, as a
+flight would start with them. With the outputs U(f, w) of the added causes at that
+instant,
+
+    bias = U(0, 0),   scale_c = [U_c(+d e_c) - U_c(-d e_c)] / 2 d,   d -> 0        (1)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.model.causes.basis import Course, RowView
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.state import State
+from fieldcal.physics.effect import Motion
+from fieldcal.physics.experience_rows import select_rows
+from fieldcal.physics.joint_turns import JointTurns
+from fieldcal.solve.explanations import WeightedExplanation, has_equation
+from fieldcal.solve.warm_scales import WARM_SCALE
+
+CHANGING = ("time", "temperature", "force and time", "flicker", WARM_SCALE)
+"""Functions without physics whose value at the end belongs to the biases and scale
+factors there; functions of angles and forces have no zero."""
+
+DERIVATIVE_STEP = 1e-3
+"""d of (1), m/s^2 and rad/s."""
+
+
+def bias_scale_at_end(d: Dictionary, shown: Sequence[WeightedExplanation]) -> Array:
+    """Derivative of biases and scale factors at the end by the columns of `d`, (1).
+
+    Returns (2, 6, k): biases and scale factors, by output and column. Columns that do
+    not belong to the explanations have 0.
+    """
+    out = np.zeros((2, 6, d.width))
+    changing = np.zeros(d.width, dtype=bool)
+    for explanation in shown:
+        for cause, group in (*explanation.members, *explanation.possible_members):
+            if not isinstance(group.effect, Motion) and (
+                group.effect is not None or cause.name in CHANGING
+            ):
+                for each in cause.variants if has_equation(group) else (group,):
+                    changing[each.columns] = True
+    if not changing.any():
+        return out
+    out[0] = _end_outputs(d, changing, np.zeros(6))
+    for c in range(6):
+        step = DERIVATIVE_STEP * np.eye(6)[c]
+        up, down = (_end_outputs(d, changing, s * step)[c] for s in (1.0, -1.0))
+        out[1, c] = (up - down) / (2 * DERIVATIVE_STEP)
+    return out
+
+
+def _end_outputs(d: Dictionary, changing: Array, felt: Array) -> Array:
+    """Outputs by column, (6, k), at the end of the recording for inputs f, w, (6,).
+
+    The last turn is taken as long ago, so that motion of the joints is excluded.
+    """
+    x = select_rows(d.x, [int(np.argmax(d.x.t))])
+    nothing, rest = np.zeros((1, 3)), float(d.x.lasts[int(np.argmax(d.x.t))]) / 2
+    x = replace(
+        x, t=x.t + rest, since_start=x.since_start + rest, lasts=np.zeros(1),
+        f=felt[None, :3], w=felt[None, 3:], w_dot=nothing, variance=nothing,
+        heating=np.zeros(1), since_turn=np.full(1, np.inf),
+        joint_turns=JointTurns.none(),
+    )  # fmt: skip
+    nowhere = State(
+        np.zeros(6), np.ones(6), np.zeros((d.position_count, 2)), np.zeros(3)
+    )
+    view = RowView(x, x, np.full((len(d.since), 1), np.inf), nowhere)
+    out = np.zeros((6, d.width))
+    for first, end, basis in d.basis_ranges():
+        if not changing[first:end].any():
+            continue
+        row = basis.evaluate(view)[0]
+        out[:, first:end] = (
+            np.kron(np.eye(6), row) if isinstance(basis, Course) else row
+        )
+    return np.where(changing, out, 0.0)

@@ -7,14 +7,17 @@ these add up. For an effect u = v T z with the prior p(v) of its size, ln Z is
     real alone        ln int p(v) exp gain(v; M_r, q_r) dv                          (1)
     simulator alone   ln int p(v) exp gain(v; M_s, q_s) dv                          (2)
     the same in both  ln int p(v) exp gain(v; M_r + M_s, q_r + q_s) dv              (3)
-    another in each   the sum of (1) and (2)                                        (4)
+    another in each   ln int p(v) p(w | v) exp [gain(v; M_r, q_r)
+                                                + gain(w; M_s, q_s)] dv dw          (4)
     in neither        0                                                             (5)
 
-In (4) the two effects may be independent, or the simulator has the same one but too
-weak or too strong: u_s = c u_r. In the second case u is taken from the session that
-shows more of it, and the other determines c alone,
+In (4) both have an effect of about one size: ln w is normal about ln v, with a standard
+deviation of ln `RESIZED`. What has a tenth of an effect, or less, leaves it out. The
+two may be independent, or the simulator has the same one but too weak or too strong:
+u_s = c u_r. In the second case u is taken from the session that shows more of it, its
+estimate is u_r = (1 + M_r)^-1 q_r, and the other determines c alone,
 
-    ln int p(v) exp gain(v; d' M_s d, d' q_s) dv,    d along (1 + M_r)^-1 q_r       (7)
+    ln int p(w | |u_r|) exp gain(w; d' M_s d, d' q_s) dw,    d along u_r            (7)
 
 Both cases have the same prior probability. A random effect has another u in each
 session anyway, and only its size v can be the same. For it, (3) is
@@ -41,11 +44,15 @@ from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import Array
 from fieldcal.model.evidence.eliminated import evidence_gains
 from fieldcal.model.evidence.sizing import LOG_DENSITY
+from fieldcal.model.priors import SIZES
 
 Relation = Literal["real", "simulator", "same", "other", "neither"]
 
 MODELLED = 0.5
 """Prior probability that a simulator has an effect that its device has."""
+
+RESIZED = 3.0
+"""Factor by which the size of an effect in a simulator is usually wrong."""
 
 DIFFERS = 0.05
 """Prior probability that a simulator differs from its device in a given group of the
@@ -94,6 +101,20 @@ def over_sizes(gain: Array) -> float:
     return float(np.logaddexp.reduce(gain + LOG_DENSITY))
 
 
+def _about(gain: Array, size: float) -> float:
+    """Ln evidence of an effect of about a size, from that at each of `SIZES`."""
+    off = np.log(SIZES / size) / np.log(RESIZED)
+    share = np.exp(-0.5 * np.square(off))
+    total = float(np.logaddexp.reduce(gain - 0.5 * np.square(off)))
+    return total - float(np.log(share.sum()))
+
+
+def _evidence_of_other_size(real: Array, sim: Array) -> float:
+    """Ln evidence (4) of effects of about one size, from that at each of `SIZES`."""
+    each = [_about(sim, float(size)) for size in SIZES]
+    return over_sizes(real + np.array(each))
+
+
 def relation_probabilities(
     real: EffectInformation | None,
     sim: EffectInformation | None,
@@ -122,7 +143,7 @@ def relation_probabilities(
     if two is not None:
         score["simulator"] = alone + over_sizes(two)
     if one is not None and two is not None and real and sim:
-        other = over_sizes(one) + over_sizes(two)  # (4)
+        other = _evidence_of_other_size(one, two)  # (4)
         if scaled is not None:
             other = float(np.logaddexp(other, scaled) - np.log(2))
         score["other"] = half + other
@@ -159,7 +180,7 @@ def evidence_of_proportional(
     along = course / size
     inner, rhs = along @ other.inner @ along, along @ other.rhs
     times = evidence_gains(np.array([[inner]]), np.array([rhs]), other.largest_diagonal)
-    return over_sizes(known.gain) + over_sizes(times) + other.shift
+    return over_sizes(known.gain) + _about(times, size) + other.shift
 
 
 def evidence_of_same_size(real: EffectInformation, sim: EffectInformation) -> float:

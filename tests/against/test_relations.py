@@ -5,10 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from fieldcal.against.causes import DecidedCauses, aliases_of
 from fieldcal.against.joint import (
+    MODELLED,
+    RESIZED,
     EffectInformation,
+    Relation,
     evidence_of_proportional,
     evidence_of_same,
     evidence_of_same_size,
@@ -53,6 +57,12 @@ def density(design: Array, y: Array, v: float) -> float:
 
 def over_sizes(values: list[float]) -> float:
     return float(np.log(np.sum(SHARE * np.exp(np.array(values)))))
+
+
+def about(size: float, values: list[float]) -> float:
+    """Over sizes that are normal in ln about one of them, by `RESIZED`."""
+    share = stats.norm.pdf(np.log(priors.SIZES), np.log(size), np.log(RESIZED))
+    return float(np.log(np.sum(share / share.sum() * np.exp(np.array(values)))))
 
 
 REAL, SIM = rows(np.array([0.02, -0.01]), 1), rows(np.array([0.015, 0.0]), 2)
@@ -135,11 +145,37 @@ def test_the_same_too_weak_is_one_number_along_what_the_other_shows() -> None:
     )
     column = (SIM[0] @ course / np.linalg.norm(course))[:, None]
     sizes = priors.SIZES
-    expected = over_sizes([density(*REAL, v) for v in sizes]) + over_sizes(
-        [density(column, SIM[1], v) for v in sizes]
+    length = float(np.linalg.norm(course))
+    expected = over_sizes([density(*REAL, v) for v in sizes]) + about(
+        length, [density(column, SIM[1], v) for v in sizes]
     )
     for pair in ((told(*REAL), told(*SIM)), (told(*SIM), told(*REAL))):
         assert evidence_of_proportional(*pair) == pytest.approx(expected, rel=1e-9)
+
+
+def test_effects_of_other_sizes_are_of_about_one_size() -> None:
+    """The sum over both sizes, of dense densities."""
+    found = relation_probabilities(told(*REAL), told(*SIM), 0.01, None)
+    sim = [density(*SIM, w) for w in priors.SIZES]
+    both = [density(*REAL, v) + about(v, sim) for v in priors.SIZES]
+    alone = over_sizes([density(*REAL, v) for v in priors.SIZES])
+    odds = 0.5 * MODELLED / (1 - MODELLED) * np.exp(over_sizes(both) - alone)
+    assert found["other"] / found["real"] == pytest.approx(odds, rel=1e-8)
+
+
+def test_what_a_simulator_has_a_hundredth_of_is_left_out() -> None:
+    """Nobody could tell it from nothing; of a third it is clear that both have it."""
+    of: tuple[tuple[float, Relation], ...]
+    of = ((0.0, "real"), (0.01, "real"), (0.3, "other"))
+    for share, expected in of:
+        shares = []
+        for seed in range(10):
+            one = told(*rows(np.array([0.3, -0.2]), seed))
+            two = told(*rows(share * np.array([0.3, -0.2]), 100 + seed))
+            scaled = evidence_of_proportional(one, two)
+            found = relation_probabilities(one, two, 0.01, None, scaled)
+            shares.append(dict(found)[expected])
+        assert np.mean(shares) > 0.9
 
 
 def test_a_simulator_that_has_some_of_it_is_told_from_one_without() -> None:

@@ -44,8 +44,8 @@ WIDEST = 70_000
 MIN_REMOVED_JUMPS = 4
 """Smallest number of jumps removed."""
 
-BYTE = 256
-"""Values of a byte."""
+BYTE, WORD = 256, 65536
+"""Values of a byte, and of two."""
 
 NEARER = 10.0
 """Factor by which values of one byte must come nearer to the prediction."""
@@ -95,9 +95,20 @@ def _swapped(counts: Counts) -> Counts:
 
 
 def _wrapped(counts: Counts) -> Counts:
+    """Counts without their jumps by 2^16; as they are if no wrap made those.
+
+    What wrapped lies within 16 bits, and a jump that is no nearer to 2^16 than to 0 may
+    as well be noise, whose next sample is as far away.
+    """
+    low, high = int(counts.min()), int(counts.max())
     jumps = np.diff(counts, prepend=counts[:1])
-    turns = -np.round(jumps / 65536).astype(np.int64)
-    return counts + 65536 * np.cumsum(turns)
+    size = np.abs(jumps) / WORD
+    clear, unclear = (size > 2 / 3).sum(), ((size > 1 / 3) & (size <= 2 / 3)).sum()
+    signed, unsigned = -WORD // 2 <= low and high < WORD // 2, low >= 0 and high < WORD
+    if not (signed or unsigned) or clear <= MIN_JUMP_RATIO * unclear:
+        return counts
+    turns = -np.round(jumps / WORD).astype(np.int64)
+    return counts + WORD * np.cumsum(turns)
 
 
 _UNDO = {

@@ -171,3 +171,22 @@ def test_nothing_is_made_of_nothing(counts: list[int]) -> None:
     kind, mended = undo_decode_fault(some)
     assert len(mended) == len(some)
     assert bool(kind) or np.array_equal(mended, some)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_many_digits_did_not_wrap(seed: int) -> None:
+    """Counts of the last digit reach beyond 16 bits, and jump by half of those."""
+    rng = np.random.default_rng(seed)
+    counts = np.round(23_000 + rng.normal(0, 12_600, 100_000)).astype(np.int64)
+    for some in (counts, counts.clip(0, 65_535)):
+        kind, mended = undo_decode_fault(some)
+        assert not kind and mended is some
+
+
+@pytest.mark.parametrize("low", [0, -(2**15)])
+def test_what_wrapped_is_put_right_from_words_with_a_sign_and_without(low: int) -> None:
+    rng = np.random.default_rng(5)
+    course = 30_000 * np.sin(np.arange(4000) / 300) + rng.normal(0, 300, 4000)
+    true = np.round(course + low + 2**16).astype(np.int64)
+    kind, mended = undo_decode_fault((true - low) % 2**16 + low)
+    assert kind == "wrapped" and np.ptp(mended - true) == 0

@@ -70,7 +70,7 @@ def rows_of_recording(source: RowSource) -> Rows:
     pieces = [six[a:b] for a, b in bound]
     angle, noise = (
         force_wander_angle(rows),
-        noise_beside_tremor(rows, pieces, rounding_noise(block, bound)),
+        noise_beside_tremor(rows, pieces, rounding_noise(block, bound).max(axis=0)),
     )
     if angle or noise is not None:
         in_hand = _add_hand_motion(

@@ -42,9 +42,9 @@ def test_steps_of_each_output() -> None:
     some = step > 0
     block = recorded(step)
     np.testing.assert_allclose(
-        rounding_noise(block, WINDOWS)[some], step[some] / 12**0.5
+        rounding_noise(block, WINDOWS)[:, some], step[some] / 12**0.5
     )
-    np.testing.assert_array_less(rounding_noise(block, WINDOWS)[~some], 1e-4)
+    np.testing.assert_array_less(rounding_noise(block, WINDOWS)[:, ~some], 1e-4)
     off = rounding_sigma(block, WINDOWS)
     assert off.shape == (2, 6), "of windows that hold samples"
     np.testing.assert_array_less(off[:, ~some], 1e-8)

@@ -190,3 +190,20 @@ def test_what_wrapped_is_put_right_from_words_with_a_sign_and_without(low: int) 
     true = np.round(course + low + 2**16).astype(np.int64)
     kind, mended = undo_decode_fault((true - low) % 2**16 + low)
     assert kind == "wrapped" and np.ptp(mended - true) == 0
+
+
+def test_an_axis_that_wraps_once_is_put_right_beside_another() -> None:
+    """One driver reads them: the second axis is turned beyond its range but once."""
+    about = description_file.parse_description(tables(TACTICAL))
+    block = record(TACTICAL, ride(TACTICAL, seed=3))
+    true = np.round(block.six / LSB).astype(np.int64)
+    rows = np.arange(200) + int(np.searchsorted(block.t, 35.0))
+    bell = 45_000 * np.sin(np.pi * np.arange(200) / 200) ** 2
+    for axis, sign in ((3, 1), (4, -1)):
+        true[rows, axis] += np.round(sign * bell).astype(np.int64)
+    true[rows + 400, 3] += np.round(bell).astype(np.int64)
+    wrapped = (true + 2**15) % 2**16 - 2**15
+    told = check_chain(with_six(block, wrapped * LSB), about)
+    found = [f.values for i, f in told.faults if i == "decode_fault"]
+    assert found == [{"channel": c, "kind": "wrapped"} for c in ("gx", "gy")]
+    np.testing.assert_allclose(told.block.six[:, 3:5], (true * LSB)[:, 3:5], atol=1e-9)

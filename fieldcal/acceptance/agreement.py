@@ -2,10 +2,16 @@
 
     P(chi2 or more) >= the smallest chance that the grade allows
 
+With as many parameters as means there is nothing to agree, and something else has to
+confirm the result: turns that the gyroscopes measured, a position that was not fitted,
+or earlier calibrations of the device.
+
 A misfit too small to matter for navigation passes (`harmless`).
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,18 +20,45 @@ from fieldcal.acceptance.harmless import harmless_scatter_note
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.probability import chi2_tail
+from fieldcal.core.sentences import join_words
+
+FIT = "fit"
+"""Name of the check whether the positions agree with each other."""
+
+NO_DOF = "no degree of freedom is left to check the fit"
+UNWITNESSED = (
+    "as many numbers are estimated as the positions measure, so that any of them may be"
+    " wrong and nothing would contradict it: record one position more, or one that is"
+    " not fitted (--verify)"
+)
 
 
-def check_fit(calibration: Calibration, limits: GradeLimits) -> Check:
-    """Check the agreement of the positions; NO-GO if the estimate is bad."""
+def check_fit(
+    calibration: Calibration, limits: GradeLimits, witnesses: Sequence[str]
+) -> Check:
+    """Check the agreement of the positions.
+
+    NO-GO if the estimate is bad, or if nothing is left to agree: with as many
+    parameters as means any mistake has its own exact solution. `witnesses` are what
+    else confirms the result, in words.
+    """
     if not calibration.good:
         why = calibration.warnings[0] if calibration.warnings else "see the fit"
-        return Check("fit", False, f"the estimate is bad: {why}")
-    if calibration.dof <= 0 or not np.isfinite(calibration.chi2):
-        return Check("fit", None, "no degree of freedom is left to check the fit")
+        return Check(FIT, False, f"the estimate is bad: {why}")
+    if not np.isfinite(calibration.chi2):
+        return Check(FIT, None, NO_DOF)
+    if not leaves_a_check(calibration):
+        if not witnesses:
+            return Check(FIT, False, UNWITNESSED)
+        return Check(FIT, None, f"{NO_DOF}: only {join_words(witnesses)} confirm it")
     return _agreement_check(
-        "fit", "positions", calibration.chi2, calibration.dof, calibration, limits
+        FIT, "positions", calibration.chi2, calibration.dof, calibration, limits
     )
+
+
+def leaves_a_check(calibration: Calibration) -> bool:
+    """Whether the positions measure more numbers than are estimated."""
+    return calibration.dof > 0
 
 
 def check_gyroscopes(calibration: Calibration, limits: GradeLimits) -> list[Check]:

@@ -11,6 +11,10 @@ windows, is
 
     P = product over axes of min(1, 4 s / (sqrt(2 pi) sqrt(s_b^2 + w_E^2 / 3)))    (2)
 
+A device removes it where it sees that it rests. One that is held in a hand is turned to
+and fro all the time and never sees that; its means are zero within that motion,
+whatever the bias, so that nothing is said of it.
+
 If a device removes the bias of its gyroscopes at rest, chi2 (1) is not significant.
 The offset after a turn is removed again within seconds, so the means are c of
 
@@ -76,6 +80,10 @@ LAGS = np.geomspace(0.25, 16.0, 49)
 CELLS = 256
 """Largest number of means in a window, for fits of (3) and (4)."""
 
+MOVED, MOVED_S = 2e-3, 0.25
+"""Spread of mean rates over so long, rad/s and s, beyond which a device moves: 0.1
+deg/s. A hand makes 5e-3 to 2e-2, and noise of a low-cost gyroscope at rest 6e-4."""
+
 SPECTRUM, OCTAVES, FILTERS = 16, 4, 4.0
 """Fewest samples of a periodogram and powers of an octave; number of octaves; standard
 deviations by which an octave below the band of a filter has more power."""
@@ -101,9 +109,12 @@ def bias_removal_probability(
 ) -> tuple[float, str]:
     """Probability that the device subtracts its bias at rest, (5), and chi2 in words.
 
-    0 if the means differ significantly from zero, or if there are too few.
+    0 if the means differ significantly from zero, if there are too few, or if a hand
+    holds the device.
     """
     held = [block.between(w.start, w.end) for w in windows]
+    if _never_rests(held):
+        return 0.0, ""
     cells = [_WindowCells.of(one) for one in held if len(one) >= SPECTRUM]
     if not cells:
         return 0.0, ""
@@ -118,6 +129,18 @@ def bias_removal_probability(
         for means, own, every in _zeroed_means(cells)
     ]
     return max(found)
+
+
+def _never_rests(held: Sequence[Block]) -> bool:
+    """Whether most windows show a motion that no device takes for rest."""
+    moves = []
+    for one in held:
+        parts = int((one.t[-1] - one.t[0]) / MOVED_S) if len(one) > 1 else 0
+        if 1 < parts <= len(one):
+            each = len(one) // parts
+            means = one.gyr[: each * parts].reshape(parts, each, 3).mean(axis=1)
+            moves.append(float(np.median(np.nan_to_num(means.std(axis=0)))))
+    return bool(moves) and float(np.median(moves)) > MOVED
 
 
 def _removal_probability(

@@ -13,7 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.acceptance.agreement import check_fit, check_gyroscopes
+from fieldcal.acceptance.agreement import (
+    FIT,
+    check_fit,
+    check_gyroscopes,
+    leaves_a_check,
+)
 from fieldcal.acceptance.angles import ANGLES, check_angles
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.check import Check
@@ -24,7 +29,7 @@ from fieldcal.acceptance.jump import check_jump
 from fieldcal.acceptance.level import check_level
 from fieldcal.acceptance.remedy import Remedy, cheapest_remedy
 from fieldcal.acceptance.site import check_site
-from fieldcal.acceptance.turn_agreement import check_turns
+from fieldcal.acceptance.turn_agreement import check_turns, turns_agree
 from fieldcal.acceptance.uncertainty import UNCERTAINTY, check_uncertainty
 from fieldcal.acceptance.verification import Verification, check_verification
 from fieldcal.acceptance.witnesses import check_doubtful_position
@@ -89,12 +94,25 @@ def decide(
 ) -> Decision:
     """Check a calibration against limits."""
     verification = check_verification(circumstances.verification, limits)
+    change = check_change(
+        calibration, limits, circumstances.family, circumstances.temperature_sigma
+    )
+    turns = check_turns(calibration, limits)
+    witnesses = [
+        what
+        for what, confirms in (
+            ("the turns that the gyroscopes measured", turns_agree(calibration, turns)),
+            ("the position that was not fitted", verification.ok is True),
+            ("earlier calibrations", bool(change) and all(c.ok for c in change)),
+        )
+        if confirms
+    ]
     checks = [
-        check_fit(calibration, limits),
+        check_fit(calibration, limits, witnesses),
         *_examination_checks(calibration),
         *check_doubtful_position(calibration, verification.ok is True),
         *check_gyroscopes(calibration, limits),
-        *check_turns(calibration, limits),
+        *turns,
         *check_jump(calibration, limits),
         *check_angles(
             calibration, about, limits, circumstances.verification, circumstances.family
@@ -103,9 +121,7 @@ def decide(
         *check_level(calibration, about),
         *check_uncertainty(calibration, about, limits, circumstances.windows),
         *check_site(calibration, about),
-        *check_change(
-            calibration, limits, circumstances.family, circumstances.temperature_sigma
-        ),
+        *change,
         verification,
         *check_temperature(np.asarray(circumstances.temperatures, float), limits),
         *check_link(circumstances.link, limits),
@@ -151,10 +167,13 @@ def _find_remedy(
     ]
     others = [c.name for c in checks if c.ok is False]
     others = [name for name in others if not name.endswith(UNCERTAINTY)]
+    unchecked = calibration.good and FIT in others and not leaves_a_check(calibration)
+    if unchecked:
+        others.remove(FIT)
     numbers = circumstances.position_numbers or range(len(about.positions))
     length = float(np.ceil(seconds))
     return cheapest_remedy(
-        calibration, about, numbers, limits, failed, sigma, length, others
+        calibration, about, numbers, limits, failed, sigma, length, others, unchecked
     )
 
 

@@ -44,6 +44,9 @@ LIMIT_SHARE = 0.9
 MAX_HOLD_S = 600.0
 """Longest time that is asked for at one position, s."""
 
+UNDETERMINED = 1e3
+"""Stands for an uncertainty without bounds, far beyond any other, SI."""
+
 DERIVATIVE_STEP_RAD = 1e-4
 """Step of the numerical derivatives t in (1), rad."""
 
@@ -85,6 +88,7 @@ def cheapest_remedy(
     sigma: float,
     seconds: float,
     others: Sequence[str] = (),
+    unchecked: bool = False,
 ) -> Remedy | None:
     """The cheapest remedy that is possible at the ladder; None if there is none.
 
@@ -98,6 +102,7 @@ def cheapest_remedy(
     sigma : standard error of the mean of a window, m/s^2
     seconds : length of a window, s
     others : failed checks that are not of an uncertainty
+    unchecked : whether the positions determine everything, and leave nothing to check
 
     """
     doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
@@ -108,10 +113,10 @@ def cheapest_remedy(
         return Remedy(says, again=(number,), seconds=seconds)
     had = [about.positions[i] for i in numbers]
     over = _limit_ratios(calibration, limits, failed)
-    if not over or not all(p.oriented for p in about.positions):
+    if not (over or unchecked) or not all(p.oriented for p in about.positions):
         return None
     of_gyr = {name for name in over if sensor_of(group_of(name)) == "gyr"}
-    if len(of_gyr) == len(over):
+    if len(of_gyr) == len(over) and not unchecked:
         return _hold_longer(calibration, about, numbers, over, seconds, others)
     # further positions determine the accelerometers, gyroscopes have to be held longer
     groups = dict.fromkeys(group_of(name) for name in of_gyr)
@@ -220,6 +225,9 @@ def _further_positions(
     before = _expected_sigma(names, held, about, known)
     allowed = [limits.sigma(group_of(name)) or np.inf for name in names]
     candidates = [Position.deg(a, b) for a, b in ladder_settings(about.positions)]
+    if not over:  # a place that was held is not checked by holding it again
+        places = {p.degrees for p in had}
+        candidates = [p for p in candidates if p.degrees not in places] or candidates
     if not candidates:  # all have a third angle: it is no ladder
         return None
     chosen: list[Position] = []
@@ -227,10 +235,14 @@ def _further_positions(
         ratios = []
         for one in candidates:
             then = _expected_sigma(names, [*held, *chosen, one], about, known)
-            ratios.append(_largest_limit_ratio(names, over, before, then, allowed))
+            ratios.append(
+                _largest_limit_ratio(names, over, before, then, allowed)
+                if over
+                else _size_of_all(then)
+            )
         best = int(np.argmin(ratios))
         chosen.append(candidates[best])
-        if ratios[best] <= LIMIT_SHARE:
+        if not over or ratios[best] <= LIMIT_SHARE:
             return _as_remedy(chosen, over, seconds, left)
     return None
 
@@ -243,14 +255,14 @@ def _as_remedy(
 ) -> Remedy:
     word = "one position" if len(chosen) == 1 else f"{len(chosen)} positions"
     where = " and ".join(p.name for p in chosen)
-    worst = max(over, key=lambda name: over[name])
-    now = f"{over[worst]:.2g} times its limit now"
-    if not np.isfinite(over[worst]):
-        now = "not determined yet"
-    says = (
-        f"{word} more for {seconds:.0f} s, {where}: {_expectation(left)}"
-        f" ({parameter_title(worst)} is {now})"
-    )
+    why = "nothing checks what the others determine"
+    if over:
+        worst = max(over, key=lambda name: over[name])
+        now = f"{over[worst]:.2g} times its limit now"
+        if not np.isfinite(over[worst]):
+            now = "not determined yet"
+        why = f"{parameter_title(worst)} is {now}"
+    says = f"{word} more for {seconds:.0f} s, {where}: {_expectation(left)} ({why})"
     angles = tuple(angles for p in chosen if (angles := p.degrees))
     return Remedy(says, positions=angles, seconds=seconds)
 
@@ -271,6 +283,14 @@ def _largest_limit_ratio(
             expected = part * then[i] / before[i] if known else then[i] / allowed[i]
             parts.append(float(expected))
     return max(parts)
+
+
+def _size_of_all(sigma: Array) -> float:
+    """Mean logarithm of expected uncertainties, which may be infinite.
+
+    The place that makes it least depends on most of them, and so contradicts most.
+    """
+    return float(np.mean(np.log(np.minimum(sigma, UNDETERMINED))))
 
 
 class _KnownErrors(NamedTuple):

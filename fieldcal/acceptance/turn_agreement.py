@@ -8,6 +8,8 @@ angles are wrong.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fieldcal.acceptance.check import Check
@@ -31,6 +33,15 @@ def turn_disagreement(calibration: Calibration, limits: GradeLimits) -> str:
         " is too small, or angles in session.toml are wrong; run fieldcal diagnose to"
         " see which"
     )
+
+
+def turns_agree(calibration: Calibration, checks: Sequence[Check]) -> bool:
+    """Whether turns were measured that might have missed, and `checks` none that did.
+
+    A turn by a wrong angle, or between other positions, is seen by the gyroscopes.
+    """
+    turns = calibration.info.get("turns", {})
+    return int(turns.get("dof", 0)) > 0 and not checks
 
 
 def check_turns(calibration: Calibration, limits: GradeLimits) -> list[Check]:

@@ -42,7 +42,7 @@ def build_fit(prepared: PreparedRecording) -> GaussNewton:
     dictionary.add_instants(change_points(rows).tolist())
     dictionary.expect_within(interruptions(source.block, about))
     grain = rounding_noise(source.block, window_bounds(source.block, about))
-    rough = bool((grain[:3] > thresholds.ROUNDING_SHARE * rows.noise[:3]).any())
+    rough = bool((grain[:, :3] > thresholds.ROUNDING_SHARE * rows.noise[:3]).any())
     # swaying is removed from windows and closures, but not from samples within turns
     rough |= "sway" in prepared.checked.ids
     turning = TurnTracker(source, rows, dictionary.since)

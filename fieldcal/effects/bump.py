@@ -108,13 +108,14 @@ def _block_means(
     nan where half of the samples are missing.
     """
     first, last = (int(i) for i in recording.windows[p])
-    size, noise = (last - first) // block, _noise(recording)
+    steps = recording.grids.within(first, last)
+    size, noise = (last - first) // block, _noise(recording, steps)
     out = np.zeros((size, 6))
     bumped = np.zeros(last - first, dtype=bool)
     for fault in loud:
         bumped[fault.rows - first] = True
     for c in range(6):
-        if recording.steps[c] > MAX_STEP_SIGMAS * recording.noise[c]:
+        if steps[c] > MAX_STEP_SIGMAS * recording.noise[c]:
             continue  # what is less than a step is lost
         if c < 3 and recording.x.rate[p].any():
             continue  # the force goes round with the table
@@ -132,14 +133,14 @@ def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list
     out = []
     around, shortest = round(AROUND_S * rate), max(2, round(0.1 * rate))
     first, last = (int(i) for i in recording.windows[p])
-    steps = 0.5 * recording.steps
-    noise = _noise(recording)
+    steps = recording.grids.within(first, last)
+    noise = _noise(recording, steps)
     z = recording.six(first, last)
     z /= noise
     _flatten(z, rate, _most_disturbed_stretch(z, rate, shortest))
     np.nan_to_num(z, copy=False)
     # what goes to the next step and back is rounded, not touched
-    for c in np.flatnonzero(steps >= noise):
+    for c in np.flatnonzero(0.5 * steps >= noise):
         z[np.abs(z[:, c]) <= ROUNDED_HALF_STEPS, c] = 0.0
     if recording.x.rate[p].any():
         z[:, :3] = 0.0  # the force goes round with the table
@@ -153,9 +154,9 @@ def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list
     return out
 
 
-def _noise(recording: CheckedSamples) -> Array:
+def _noise(recording: CheckedSamples, steps: Array) -> Array:
     """Standard deviation of a sample, at least half a step, (6,)."""
-    noise: Array = np.maximum(recording.noise, 0.5 * recording.steps)
+    noise: Array = np.maximum(recording.noise, 0.5 * steps)
     noise[noise == 0.0] = np.inf  # what never changes is not pushed
     return noise
 

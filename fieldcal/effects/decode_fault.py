@@ -41,11 +41,11 @@ MIN_JUMP_RATIO = 5
 WIDEST = 70_000
 """Largest count of a 16-bit value; larger ones are decimals."""
 
-MIN_REMOVED_JUMPS = 4
-"""Smallest number of jumps removed."""
+MIN_REMOVED_JUMPS, WRAPPED_ONCE = 4, 2
+"""Smallest number of jumps removed, and of an axis beside others that wrap."""
 
-BYTE = 256
-"""Values of a byte."""
+BYTE, WORD = 256, 65536
+"""Values of a byte, and of two."""
 
 NEARER = 10.0
 """Factor by which values of one byte must come nearer to the prediction."""
@@ -68,8 +68,13 @@ MOVED = (np.inf, 10.0)
 a sample by any force, but its rate does not come and go within one."""
 
 
-def undo_decode_fault(counts: Counts) -> tuple[str, Counts]:
-    """Return the kind of fault, "" if none, and the counts without it."""
+def undo_decode_fault(
+    counts: Counts, fewest: int = MIN_REMOVED_JUMPS
+) -> tuple[str, Counts]:
+    """Return the kind of fault, "" if none, and the counts without it.
+
+    `fewest` jumps must go.
+    """
     before = np.abs(np.diff(counts))
     best, kind, mended = float(before.sum()), "", counts
     for name, undo in _UNDO.items():
@@ -78,7 +83,7 @@ def undo_decode_fault(counts: Counts) -> tuple[str, Counts]:
         gone = int(((before > JUMP) & (after < before / 2)).sum())
         made = int(((after > JUMP) & (before < after / 2)).sum())
         if (
-            gone >= MIN_REMOVED_JUMPS
+            gone >= fewest
             and gone > MIN_JUMP_RATIO * made
             and float(after.sum()) < best
         ):
@@ -95,9 +100,20 @@ def _swapped(counts: Counts) -> Counts:
 
 
 def _wrapped(counts: Counts) -> Counts:
+    """Counts without their jumps by 2^16; as they are if no wrap made those.
+
+    What wrapped lies within 16 bits, and a jump that is no nearer to 2^16 than to 0 may
+    as well be noise, whose next sample is as far away.
+    """
+    low, high = int(counts.min()), int(counts.max())
     jumps = np.diff(counts, prepend=counts[:1])
-    turns = -np.round(jumps / 65536).astype(np.int64)
-    return counts + 65536 * np.cumsum(turns)
+    size = np.abs(jumps) / WORD
+    clear, unclear = (size > 2 / 3).sum(), ((size > 1 / 3) & (size <= 2 / 3)).sum()
+    signed, unsigned = -WORD // 2 <= low and high < WORD // 2, low >= 0 and high < WORD
+    if not (signed or unsigned) or clear <= MIN_JUMP_RATIO * unclear:
+        return counts
+    turns = -np.round(jumps / WORD).astype(np.int64)
+    return counts + WORD * np.cumsum(turns)
 
 
 _UNDO = {
@@ -123,8 +139,15 @@ class DecodeFault(Chain):
     def find(self, recording: CheckedSamples) -> list[Fault]:
         """Channels that become smooth when a slip is undone, or without wild values."""
         wild = _outlier_samples(recording)
-        found = (_fault(recording, c) or _restore_outliers(recording, c, wild[:, c])
-                 for c in range(len(CHANNELS)))  # fmt: skip
+        slips = [_fault(recording, c) for c in range(len(CHANNELS))]
+        for first in (0, 3):
+            triad = range(first, first + 3)
+            if any(f and f.values["kind"] == "wrapped" for f in slips[first:][:3]):
+                # one driver reads all three; one turn wraps an axis there and back
+                again = (slips[c] or _fault(recording, c, WRAPPED_ONCE) for c in triad)
+                slips[first : first + 3] = again
+        found = (slip or _restore_outliers(recording, c, wild[:, c])
+                 for c, slip in enumerate(slips))  # fmt: skip
         return [fault for fault in found if fault is not None]
 
 
@@ -207,8 +230,10 @@ def _restore_outliers(
     )
 
 
-def _fault(recording: CheckedSamples, c: int) -> Fault | None:
-    """Decoding fault of one channel; None if there is none."""
+def _fault(
+    recording: CheckedSamples, c: int, fewest: int = MIN_REMOVED_JUMPS
+) -> Fault | None:
+    """Decoding fault of one channel; None if there is none. `fewest` jumps must go."""
     lsb = float(recording.steps[c])
     values, t = recording.channel(c), recording.block.t
     if not lsb or not np.isfinite(values).all() or not np.ptp(values):
@@ -216,7 +241,7 @@ def _fault(recording: CheckedSamples, c: int) -> Fault | None:
     if np.abs(values).max() > WIDEST * lsb:
         return None
     counts = np.round(values / lsb).astype(np.int64)
-    kind, mended = undo_decode_fault(counts)
+    kind, mended = undo_decode_fault(counts, fewest)
     fine = _finer_step(values, lsb) if np.abs(counts).max() <= BYTE // 2 else 0.0
     if fine:
         # swapped counts of one byte are multiples of 256, or one less

@@ -95,7 +95,7 @@ def _is_noisiest_in_most_windows(
     found = []
     for first, last in recording.windows:
         noise = short_lag_noise(recording.six(first, last)[:, triad])
-        noise = np.maximum(noise, recording.steps[triad])
+        noise = np.maximum(noise, recording.grids.within(first, last)[triad])
         if last - first > MIN_WINDOW_SAMPLES and np.isfinite(noise).all():
             axis, ratio = noisiest_axis(noise)
             found.append(axis == worst and ratio > HALF)

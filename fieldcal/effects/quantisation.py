@@ -18,8 +18,6 @@ array([0.0539])
 
 from __future__ import annotations
 
-import numpy as np
-
 from fieldcal.core.samples import CHANNELS
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
@@ -41,25 +39,30 @@ class Quantisation(Chain):
     def find(self, recording: CheckedSamples) -> list[Fault]:
         """The step of each triad, where it is coarse against the noise."""
         out = []
+        t, whole = recording.block.t, len(recording.block)
         for part, channels in (("acc", (0, 1, 2)), ("gyr", (3, 4, 5))):
-            steps = [self._step(recording, c) for c in channels]
-            if any(steps):
-                worst = channels[int(np.argmax(steps))]
-                t, lsb = recording.block.t, max(steps)
+            coarse = [
+                (step, c, first, last)
+                for c in channels
+                for first, last, step in recording.grids.stretches(c, whole)
+                if self._matters(recording, c, step)
+            ]
+            if coarse:
+                lsb, worst, first, last = max(coarse)
                 out.append(
                     Fault(
                         channel=CHANNELS[worst],
                         values={part: lsb},
                         sigmas={part: 1e-3 * lsb},
-                        from_s=float(t[0]),
-                        to_s=float(t[-1]),
+                        from_s=float(t[first]),
+                        to_s=float(t[last - 1]),
                         size=lsb,
                         sigma=lsb / max(float(recording.noise[worst]), 1e-12),
                     )
                 )
         return out
 
-    def _step(self, recording: CheckedSamples, c: int) -> float:
-        lsb = recording.steps[c]
-        own = rounding.noise_before_rounding(recording.noise[c], lsb)
-        return float(lsb) if lsb > 2 * MATTERS * own else 0.0
+    def _matters(self, recording: CheckedSamples, c: int, lsb: float) -> bool:
+        finest = recording.grids.steps[:, c].min()
+        own = rounding.noise_before_rounding(recording.noise[c], finest)
+        return bool(lsb > 2 * MATTERS * own)

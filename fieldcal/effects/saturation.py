@@ -104,16 +104,28 @@ class Saturation(Chain):
             noise = float(np.nanmax(recording.noise[first : first + 3], initial=0.0))
             for _ in range(2):
                 for c in range(first, first + 3):
-                    values = recording.channel(c)
-                    if c not in found and np.isfinite(values).any():
-                        coarse = bool(recording.steps[c] > noise)
-                        if at := samples_at_rails(values, limit, coarse):
-                            found[c] = np.sort(np.concatenate(at))
+                    if c not in found and len(
+                        at := _at_rails(recording, c, limit, noise)
+                    ):
+                        found[c] = at
                 if not found:
                     break
                 limit = float(max(_size(recording, c, at) for c, at in found.items()))
             out += [_fault(recording, c, found[c]) for c in sorted(found)]
         return out
+
+
+def _at_rails(recording: CheckedSamples, c: int, limit: float, noise: float) -> Rows:
+    """Samples of a channel at its rails, which may change with its range.
+
+    `noise` is that of its triad.
+    """
+    values, out = recording.channel(c), [np.empty(0, dtype=np.intp)]
+    for first, last, step in recording.grids.stretches(c, len(values)):
+        part = values[first:last]
+        if np.isfinite(part).any():
+            out += [first + at for at in samples_at_rails(part, limit, step > noise)]
+    return np.sort(np.concatenate(out))
 
 
 def _size(recording: CheckedSamples, c: int, rows: Rows) -> float:

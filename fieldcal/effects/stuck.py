@@ -16,12 +16,14 @@ if it goes on while the device is turned. Source: model of this project.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array, runs_of_true
 from fieldcal.physics.effect import Chain
-from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
+from fieldcal.physics.recording import CheckedSamples, Fault
 from fieldcal.physics.shape import Shape
 from fieldcal.windows.dead_axis import dead_sensors
 
@@ -80,7 +82,7 @@ class Stuck(Chain):
         t, out = recording.block.t, []
         step = float(np.median(np.diff(t)))
         for c, name in enumerate(CHANNELS):
-            for first, last in equal_value_runs(recording.channel(c)).tolist():
+            for first, last in _runs_by_grid(recording, c):
                 if _is_explained_by_steps(recording, c, first, last):
                     continue
                 begins, ends = float(t[first]), float(t[last - 1] + step)
@@ -98,6 +100,14 @@ class Stuck(Chain):
         return out
 
 
+def _runs_by_grid(recording: CheckedSamples, c: int) -> Iterator[tuple[int, int]]:
+    """Runs of equal values, each as it is usual on the grid of its stretch."""
+    values = recording.channel(c)
+    for start, end, _ in recording.grids.stretches(c, len(values)):
+        for first, last in equal_value_runs(values[start:end]).tolist():
+            yield start + first, start + last
+
+
 def _is_explained_by_steps(
     recording: CheckedSamples, c: int, first: int, last: int
 ) -> bool:
@@ -105,7 +115,7 @@ def _is_explained_by_steps(
     if last - first == len(recording.block):
         dead = dead_sensors(recording.block.six)
         return not any(c in one.axes for one in dead if not one.absent)
-    step = float(grids_of(recording.block)[c])
+    step = float(recording.grids.within(first, last)[c])
     step_of = step / max(float(recording.noise[c]), 1e-300)
     # a turn begins slowly: its first samples may read as those of the rest before
     if step_of > 2 and _turned(recording, c, first, last) < MIN_RUN_SAMPLES:

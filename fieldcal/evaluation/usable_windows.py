@@ -22,7 +22,12 @@ from fieldcal.evaluation.window_mean import (
     table_rate,
 )
 from fieldcal.model.rows.base_sway import find_base_sway
-from fieldcal.physics.recording import grids_of
+from fieldcal.model.rows.window_bounds import window_bounds
+from fieldcal.physics.grid_stretches import (
+    grids_by_stretch,
+    windows_on_one_grid,
+)
+from fieldcal.physics.recording import Grids
 from fieldcal.session.description import Description
 from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 from fieldcal.session.folder import Session
@@ -120,8 +125,10 @@ def _average_windows(
     session: Session, block: Block, warnings: list[str]
 ) -> dict[int, Average]:
     """Averages by position number; appends sentences about windows to `warnings`."""
-    about, grain = session.about, _rounding_grain(session)
-    warnings += _range_warnings(session)
+    grids = grids_by_stretch(session.block)
+    about, remarks = _cut_where_grids_change(session, grids)
+    grains = _rounding_grains(session, grids, window_bounds(block, about))
+    warnings += (*_range_warnings(session), *remarks)
     sways = find_base_sway(block, about)
     if sways is not None:
         block = sways.block
@@ -134,9 +141,9 @@ def _average_windows(
         try:
             if about.positions[i].on_turning_table:
                 rate = table_rate(block, window, about, i)
-                found, remark = average_turntable_window(block, window, rate, grain)
+                found, remark = average_turntable_window(block, window, rate, grains[i])
             else:
-                found, noise, remark = average_window(block, window, noise, grain)
+                found, noise, remark = average_window(block, window, noise, grains[i])
         except FieldcalError as error:
             warnings.append(f"{_position_label(session, i)} is left out: {error}")
             continue
@@ -153,6 +160,25 @@ def _average_windows(
             f" {join_words(missing)}, which others have; take it again"
         )
     return taken
+
+
+def _cut_where_grids_change(
+    session: Session, grids: Grids
+) -> tuple[Description, list[str]]:
+    """The windows, each on one grid, and sentences about those that were cut."""
+    about, t = session.about, session.block.t
+    whole = window_bounds(session.block, about)
+    kept = windows_on_one_grid(session.block, grids, whole)
+    windows, said = list(about.windows), []
+    for i in np.flatnonzero((kept != whole).any(axis=1)).tolist():
+        start, end = t[kept[i, 0]], t[kept[i, 1] - 1]
+        windows[i] = float(start), float(np.nextafter(end, np.inf))
+        said.append(
+            f"{_position_label(session, i)}: the resolution of the outputs changes"
+            f" within it; its mean is that of the part from {start:.1f} to {end:.1f} s:"
+            " record with one range and one number format"
+        )
+    return replace(about, windows=tuple(windows)), said
 
 
 def _incomplete(
@@ -243,18 +269,23 @@ def _missing_unit_hint(about: Description) -> str:
     return f"; session.toml must say in [nominal] {' and '.join(missing)}"
 
 
-def _rounding_grain(session: Session) -> Grain:
-    """Rounding that the device reported, or else its steps as the recording shows them.
+def _rounding_grains(
+    session: Session, grids: Grids, bounds: NDArray[np.intp]
+) -> list[Grain]:
+    """Rounding in each window, as the device reported or as the recording shows it.
 
     The latter only if an output repeats one value throughout a window, which then does
-    not show its noise and its step.
+    not show its noise and its step. `bounds` (p, 2) are the samples of the windows.
     """
-    reported, block = reported_grain(session), session.block
+    reported = reported_grain(session)
     if reported.step.all():
-        return reported
-    steps = np.where(_constant(session), grids_of(block), 0.0)
-    acc, gyr = float(steps[ACC].max()), float(steps[GYR].max())
-    return Grain(reported.acc or acc, reported.gyr or gyr, reported.cut)
+        return [reported] * len(bounds)
+    constant, out = _constant(session), []
+    for first, last in bounds.tolist():
+        steps = np.where(constant, grids.within(first, last), 0.0)
+        acc, gyr = float(steps[ACC].max()), float(steps[GYR].max())
+        out.append(Grain(reported.acc or acc, reported.gyr or gyr, reported.cut))
+    return out
 
 
 def _constant(session: Session) -> NDArray[np.bool_]:

@@ -117,7 +117,7 @@ def rotate_positions(x: Experience, small_rotation: Array) -> Experience:
     small = small_rotation[np.maximum(x.position, 0)] * (x.position >= 0)[:, None]
     # without accelerometers the vertical is not known
     free = ~x.oriented & (np.linalg.norm(x.f, axis=1) > 0)
-    x = x.turned(alpha=x.alpha + small[:, 0], beta=x.beta + small[:, 1])
+    x = x.set_off(alpha=x.alpha + small[:, 0], beta=x.beta + small[:, 1])
     if free.any():
         f = x.f.copy()
         f[free] += _sideways(f[free], small[free])
@@ -157,7 +157,7 @@ def tilt_positions(x: Experience, attitude: Array) -> Experience:
     new = table[x.position]
     old = np.column_stack([x.alpha, x.beta, x.gamma])
     alpha, beta, gamma = np.where(np.isnan(new), old, new).T
-    return x.turned(alpha=alpha, beta=beta, gamma=gamma)
+    return x.set_off(alpha=alpha, beta=beta, gamma=gamma)
 
 
 def perpendicular_vectors(f: Array) -> tuple[Array, Array]:

@@ -216,6 +216,28 @@ class Experience:
             self.mounting.T @ direction_cosines(self.alpha, self.beta, third), float
         )
 
+    def set_off(self, **angles: Array) -> Self:
+        """The rows at other angles than stated, by errors of setting them.
+
+        The axis of a rate table stays where it is in the base. In the device it is
+        then elsewhere, and some of the table's rate comes in across. `angles` are some
+        of alpha, beta and gamma, (n,) rad.
+        """
+        turning = self.rate.any(axis=1) & self.oriented
+        if not turning.any():
+            return self.turned(**angles)
+        ends = []
+        for of in ({}, angles):
+            alpha, beta, gamma = (
+                of.get(name, getattr(self, name))[turning]
+                for name in ("alpha", "beta", "gamma")
+            )
+            ends.append(direction_cosines(alpha, beta, gamma))
+        stated, real = ends
+        rate = self.rate.copy()
+        rate[turning] = np.einsum("nij,nkj,nk->ni", real, stated, rate[turning])
+        return replace(self, rate=rate).turned(**angles)
+
     def turned(self, **changes: Any) -> Self:
         """Make the changes and bring f and w of the oriented rows up to date.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,6 +23,43 @@ Any gap is within 5 % of a whole number by chance once in ten times."""
 
 
 @dataclass(frozen=True, slots=True)
+class Grids:
+    """Steps of the grids of six outputs, by stretch.
+
+    Attributes
+    ----------
+    starts : (k,) first sample of each stretch; that of the first one is 0
+    steps : (k, 6) step in each, SI; 0 where values lie on no grid
+
+    """
+
+    starts: NDArray[np.intp]
+    steps: Array
+
+    def within(self, first: int, last: int) -> Array:
+        """Largest step among samples, (6,)."""
+        largest: Array = self.steps[self._stretches(first, last)].max(axis=0)
+        return largest
+
+    def stretches(self, c: int, size: int) -> Iterator[tuple[int, int, float]]:
+        """First sample, one past the last, and step, of the stretches of a channel."""
+        kept = np.flatnonzero(np.diff(self.steps[:, c], prepend=-1.0))
+        ends = [*self.starts[kept[1:]].tolist(), size]
+        for k, end in zip(kept.tolist(), ends, strict=True):
+            yield int(self.starts[k]), int(end), float(self.steps[k, c])
+
+    @property
+    def changed(self) -> NDArray[np.bool_]:
+        """Channels whose grid changes, (6,)."""
+        out: NDArray[np.bool_] = np.any(self.steps != self.steps[0], axis=0)
+        return out
+
+    def _stretches(self, first: int, last: int) -> slice:
+        at = np.searchsorted(self.starts, [first, max(last - 1, first)], side="right")
+        return slice(int(at[0]) - 1, int(at[1]))
+
+
+@dataclass(frozen=True, slots=True)
 class CheckedSamples:
     """Samples, and what was known about them.
 
@@ -34,7 +71,8 @@ class CheckedSamples:
     scale, bias : (6,) nominal calibration, in `samples.CHANNELS` order
     noise : (6,) standard deviation of one sample, as means over a second obey it
     quick : (6,) the same, as one sample differs from the next
-    steps : (6,) step of the grid that values lie on, 0 where they lie on none
+    steps : (6,) step of the grid that all values lie on, 0 where they lie on none
+    grids : grids of stretches of the recording
     limits : (2,) full scale of accelerometers and gyroscopes, SI; nan where unknown
     rate_hz : nominal rate; nan where unknown
 
@@ -48,6 +86,7 @@ class CheckedSamples:
     noise: Array
     quick: Array
     steps: Array
+    grids: Grids
     limits: Array
     rate_hz: float
 
@@ -143,12 +182,17 @@ def lsb_of(values: Array) -> float:
     >>> round(lsb_of(np.round(np.arange(20) * 2.39e-3, 3)), 12)  # 0.002 and 0.003 apart
     0.001
     """
-    some = values[np.isfinite(values)]
     # one rest may show two values alone
-    return _step_between(np.unique(some[:: max(1, len(some) // GRID_SAMPLES)]))
+    return step_between(shown_values(values))
 
 
-def _step_between(shown: Array) -> float:
+def shown_values(values: Array) -> Array:
+    """Values that some of the samples (n,) show, each once, in order."""
+    some = values[np.isfinite(values)]
+    return np.unique(some[:: max(1, len(some) // GRID_SAMPLES)])
+
+
+def step_between(shown: Array) -> float:
     """Step of the grid of values that are shown, in order; 0 is not looked at."""
     distinct = shown[shown != 0.0]
     gaps = np.diff(distinct)
@@ -188,7 +232,7 @@ def grids_of(block: Block) -> Array:
 def _grids(triad: Array) -> Array:
     some = triad[:: max(1, len(triad) // GRID_SAMPLES)]
     shown = [np.unique(axis[np.isfinite(axis)]) for axis in some.T]
-    steps = np.array([_step_between(values) for values in shown])
+    steps = np.array([step_between(values) for values in shown])
     few = np.array([0 < len(values) < MIN_GRID_VALUES for values in shown])
     known = steps[steps > 0]
     if not len(known):

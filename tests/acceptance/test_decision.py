@@ -572,3 +572,28 @@ def test_a_misfit_counts_by_what_it_does_to_the_navigator(
 def test_where_all_positions_have_a_third_angle_home_verifies_them() -> None:
     three = [Position.deg(a, 10.0, gamma=c) for a, c in ((0, 90), (30, -90))]
     assert propose_verification(three) == Position.deg(0.0, 0.0)
+
+
+def test_as_many_parameters_as_means_are_no_go_without_a_witness() -> None:
+    """Any mistake has an exact solution then: chi2 is 0, however large it is."""
+    exact = replace(calibration(), chi2=0.0, dof=0)
+    made = decided(exact)
+    assert [c.name for c in made.checks if c.ok is False] == ["fit"]
+    assert "one position more" in made.reasons[0] and "--verify" in made.reasons[0]
+    held = Position.deg(30, 0)
+    truth = 0.1 + np.array([-G * np.sin(np.pi / 6), -G * np.cos(np.pi / 6), 0.0])
+    window = Average(np.r_[truth, [0.01] * 3], np.eye(6) * 1e-8, 21.0, 3000, 0.0, 30.0)
+    about = description_file.parse_description({"site": {"gravity": G}})
+    assert decided(exact, verification=verify(exact, about, held, window)).go
+    earlier = [_shifted(exact, 1e-4 * k) for k in range(5)]
+    assert decided(exact, family=earlier).go
+    assert not decided(_shifted(exact, 0.2), family=earlier).go
+    assert not decided(exact, family=[]).go, "the first of a device has no witness"
+    for dof, go in ((2, True), (0, False)):
+        turns = {"chi2": 1.5, "dof": dof, "scatter_rad": 0.0}
+        seen = decided(replace(exact, info={**exact.info, "turns": turns}))
+        assert seen.go is go
+        said = [c.says for c in seen.checks if c.name == "fit"]
+        assert (
+            "only the turns that the gyroscopes measured confirm it" in said[0]
+        ) == go

@@ -441,3 +441,26 @@ def test_means_of_exactly_zero_are_no_fault_of_the_check() -> None:
     windows, block = at_rest(np.random.default_rng(13), 0.0)
     block.gyr[:] = 5e-4 * np.where(np.arange(len(block)) % 2, 1.0, -1.0)[:, None]
     assert 0.0 <= bias_removal_probability(windows, block, KEEPS, LEAST)[0] <= 1.0
+
+
+@pytest.mark.parametrize("trembles", [False, True])
+def test_a_hand_hides_a_small_bias_and_never_rests(trembles: bool) -> None:
+    """Of a gyroscope of 1e-4 rad/s; the same means at rest are those of a device that
+    subtracts them."""
+    rng, bias, said = np.random.default_rng(8), np.array([1e-4, -8e-5, 6e-5]), 0
+    t = np.arange(20 * 400) / RATE
+    for _ in range(5):
+        gyr = np.zeros((len(t), 3)) if not trembles else np.tile(bias, (len(t), 1))
+        gyr += NOISE / 10 * rng.standard_normal(gyr.shape)
+        if trembles:  # angles of a tenth of a degree, at frequencies of a hand
+            for hz in rng.uniform(0.5, 6.0, 8):
+                swing = np.deg2rad(0.05) * rng.standard_normal(3) * 2 * np.pi * hz
+                gyr += np.outer(np.cos(2 * np.pi * hz * t + rng.uniform(0, 6)), swing)
+        windows = [
+            Average(np.zeros(6), np.eye(6), 21.0, 400, 4.0 * k, 4.0 * (k + 1))
+            for k in range(20)
+        ]
+        block = Block.of(t, np.zeros_like(gyr), gyr)
+        chance, _ = bias_removal_probability(windows, block, KEEPS, LEAST)
+        said += chance > DOUBT
+    assert said == (0 if trembles else 5)

@@ -25,7 +25,11 @@ QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
 
 
 def decided(
-    folder: Path, angles: list[tuple[float, float]], bounds: GradeLimits
+    folder: Path,
+    angles: list[tuple[float, float]],
+    bounds: GradeLimits,
+    without_gyroscopes: bool = False,
+    **said: float,
 ) -> Calibration:
     """A session of a virtual device in these positions, solved and decided about."""
     positions = [
@@ -33,8 +37,10 @@ def decided(
         for i, (a, b) in enumerate(angles)
     ]
     block = recorded(Profile(noise=QUIET), positions)
+    if without_gyroscopes:
+        block = replace(block, gyr=np.full_like(block.gyr, np.nan))
     site: dict[str, float] = {"latitude_deg": 50.45, "height_m": 170.0}
-    site |= {"angle_setting_deg": 0.05}
+    site |= {"angle_setting_deg": 0.05, **said}
     session = Session.open(write_session(folder, block, positions, site=site))
     still = usable_windows(session)
     return assess(solve_session(session, still), session, still, bounds, None)
@@ -280,3 +286,21 @@ def test_go_is_promised_only_as_far_as_nothing_else_fails(
     assert remedy is not None and says in remedy.says
     promised = "GO is expected (" in remedy.says
     assert promised == (not others)
+
+
+def test_two_positions_need_a_third_one_elsewhere_to_be_checked(tmp_path: Path) -> None:
+    """A wrong angle of the second shows nowhere, until a place is held besides."""
+    loose = replace(LIMITS, acc_bias_sigma=1.0, acc_scale_sigma=1.0, gyr_bias_sigma=1.0)
+    two = [(0.0, 0.0), (45.0, 5.0)]
+    assert decided(tmp_path / "turned", two, loose, level_deg=0.01).info["decision"][
+        "go"
+    ]
+    then = decided(tmp_path / "two", two, loose, True, level_deg=0.01)
+    decision = then.info["decision"]
+    assert then.dof == 0 and not decision["go"]
+    assert [c["name"] for c in decision["checks"] if c["ok"] is False] == ["fit"]
+    (place,) = decision["remedy"]["positions"]
+    third = (place["alpha_deg"], place["beta_deg"])
+    assert third not in two and "then GO is expected" in decision["remedy"]["says"]
+    three = decided(tmp_path / "three", [*two, third], loose, True, level_deg=0.01)
+    assert three.dof > 0 and three.info["decision"]["go"]

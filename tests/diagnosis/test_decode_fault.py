@@ -171,3 +171,39 @@ def test_nothing_is_made_of_nothing(counts: list[int]) -> None:
     kind, mended = undo_decode_fault(some)
     assert len(mended) == len(some)
     assert bool(kind) or np.array_equal(mended, some)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_many_digits_did_not_wrap(seed: int) -> None:
+    """Counts of the last digit reach beyond 16 bits, and jump by half of those."""
+    rng = np.random.default_rng(seed)
+    counts = np.round(23_000 + rng.normal(0, 12_600, 100_000)).astype(np.int64)
+    for some in (counts, counts.clip(0, 65_535)):
+        kind, mended = undo_decode_fault(some)
+        assert not kind and mended is some
+
+
+@pytest.mark.parametrize("low", [0, -(2**15)])
+def test_what_wrapped_is_put_right_from_words_with_a_sign_and_without(low: int) -> None:
+    rng = np.random.default_rng(5)
+    course = 30_000 * np.sin(np.arange(4000) / 300) + rng.normal(0, 300, 4000)
+    true = np.round(course + low + 2**16).astype(np.int64)
+    kind, mended = undo_decode_fault((true - low) % 2**16 + low)
+    assert kind == "wrapped" and np.ptp(mended - true) == 0
+
+
+def test_an_axis_that_wraps_once_is_put_right_beside_another() -> None:
+    """One driver reads them: the second axis is turned beyond its range but once."""
+    about = description_file.parse_description(tables(TACTICAL))
+    block = record(TACTICAL, ride(TACTICAL, seed=3))
+    true = np.round(block.six / LSB).astype(np.int64)
+    rows = np.arange(200) + int(np.searchsorted(block.t, 35.0))
+    bell = 45_000 * np.sin(np.pi * np.arange(200) / 200) ** 2
+    for axis, sign in ((3, 1), (4, -1)):
+        true[rows, axis] += np.round(sign * bell).astype(np.int64)
+    true[rows + 400, 3] += np.round(bell).astype(np.int64)
+    wrapped = (true + 2**15) % 2**16 - 2**15
+    told = check_chain(with_six(block, wrapped * LSB), about)
+    found = [f.values for i, f in told.faults if i == "decode_fault"]
+    assert found == [{"channel": c, "kind": "wrapped"} for c in ("gx", "gy")]
+    np.testing.assert_allclose(told.block.six[:, 3:5], (true * LSB)[:, 3:5], atol=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from fieldcal.core.samples import Array, Block
 from fieldcal.effects.stuck import Stuck
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.recording import CheckedSamples
+from fieldcal.physics.recording import CheckedSamples, Grids
 
 RATE, STEP = 5.0, 0.1
 REST, TURN = 300, 60
@@ -33,7 +33,8 @@ def slow(stands: int) -> CheckedSamples:
     return CheckedSamples(
         Block.of(np.arange(n) / RATE, six[:, :3], six[:, 3:]), windows,
         Experience.at_rest(nowhere, nowhere, 9.8), np.ones(6), np.zeros(6), still,
-        still, np.full(6, STEP), np.full(2, np.nan), RATE,
+        still, np.full(6, STEP), Grids(np.zeros(1, np.intp), np.full((1, 6), STEP)),
+        np.full(2, np.nan), RATE,
     )  # fmt: skip
 
 

@@ -43,9 +43,15 @@ MATRIX = np.array(
 
 
 def spun(
-    noise: float, seed: int, turning: list[list[float]] = RATES
+    noise: float,
+    seed: int,
+    turning: list[list[float]] = RATES,
+    setting_deg: float = 0.0,
 ) -> tuple[Block, list[dict[str, Any]]]:
-    """The samples, with the axis pointing where it did from any angle on."""
+    """The samples, with the axis pointing where it did from any angle on.
+
+    Both angles of each position are off by so much, one standard deviation.
+    """
     rng = np.random.default_rng(seed)
     phi = np.deg2rad(LATITUDE_DEG)
     earth = OMEGA * np.array([0.0, -np.sin(phi), np.cos(phi)])
@@ -57,6 +63,10 @@ def spun(
         phase = rng.uniform(0, 2 * np.pi) / max(float(np.linalg.norm(w)), 1e-9)
         seen = Rotation.from_rotvec(-np.outer(t - start + phase, w))
         force, rates = seen.apply([0.0, -G, 0.0]), w + seen.apply(earth)
+        if setting_deg:
+            off = rng.normal(0.0, setting_deg, 2)
+            tilted = Rotation.from_euler("zx", off, degrees=True)
+            force, rates = tilted.apply(force), tilted.apply(rates)
         times.append(t)
         outputs.append(np.hstack([force, BIAS + rates @ MATRIX.T]))
         positions.append(
@@ -87,6 +97,23 @@ def pulls(found: Calibration) -> Array:
             name = f"gyr_scale.{axis}" if i == j else name
             out.append((found.value(name), MATRIX[i, j], name))
     return np.array([(v - true) / found.uncertainty(n) for v, true, n in out])
+
+
+def test_angles_that_are_a_little_off_let_some_of_the_rate_in_across(
+    tmp_path: Path,
+) -> None:
+    """Of 45 deg/s a hundredth of a degree makes 1.4e-4 rad/s, the same in all of it."""
+    every, chi2 = [], []
+    for seed in range(4):
+        block, positions = spun(2e-4, seed, RATES * 2, setting_deg=0.01)
+        nominal = {"gyr_bias": BIAS.tolist(), "gyr_scale": np.diag(MATRIX).tolist()}
+        folder = write_session(tmp_path / str(seed), block, positions, nominal=nominal)
+        found = solve(observe(Session.open(folder))[0], angle_sigma_deg=0.01)
+        agreed = found.info["gyroscopes"]
+        chi2.append(agreed["chi2"] / agreed["dof"])
+        every.append(pulls(found))
+    assert 0.4 < np.mean(chi2) < 1.6
+    assert np.abs(every).max() < 4 and 0.4 < np.mean(np.square(every)) < 1.6
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,10 @@ from fieldcal.model.rows.vibration import quiet_window_noise
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.grid_stretches import (
+    grids_by_stretch,
+    windows_on_one_grid,
+)
 from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
 from fieldcal.session.description import Description
 from fieldcal.windows.dead_axis import dead_sensors
@@ -80,6 +84,7 @@ def check_chain(block: Block, about: Description) -> CheckedRecording:
         # a sensor without any signal is not reported as stuck as well
         usable[:, sensor.channels] &= not sensor.absent
     block, samples = _correct(block, usable, about, faults)
+    samples = _on_one_grid_each(samples, usable, about)
     for name in _ids_by_treatment("mask"):
         before = len(faults)
         new_faults = _find(name, samples)
@@ -115,6 +120,20 @@ def _correct(
                 block = block.with_six(six)
                 samples = samples_to_check(block, usable, about)
     return block, samples
+
+
+def _on_one_grid_each(
+    samples: CheckedSamples, usable: Mask, about: Description
+) -> CheckedSamples:
+    """The samples without the part of a window that lies on another grid."""
+    if not samples.grids.changed.any():
+        return samples
+    block, windows = samples.block, samples.windows
+    for whole, kept in zip(
+        windows, windows_on_one_grid(block, samples.grids, windows), strict=True
+    ):
+        usable[whole[0] : kept[0]] = usable[kept[1] : whole[1]] = False
+    return samples_to_check(block, usable, about)
 
 
 def find_in_recorded_samples(
@@ -239,5 +258,6 @@ def samples_to_check(block: Block, usable: Mask, about: Description) -> CheckedS
         scale=np.concatenate([about.nominal["acc_scale"], about.nominal["gyr_scale"]]),
         bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
         noise=noise.white, quick=noise.quick, steps=grids_of(block),
-        limits=np.array(limits), rate_hz=about.rate_hz or np.nan,
+        grids=grids_by_stretch(block), limits=np.array(limits),
+        rate_hz=about.rate_hz or np.nan,
     )  # fmt: skip

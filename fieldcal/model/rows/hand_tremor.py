@@ -68,7 +68,8 @@ def rows_of_recording(source: RowSource) -> Rows:
     six = block.six
     pieces = [six[a:b] for a, b in bound]
     angle = force_wander_angle(rows)
-    noise = noise_beside_tremor(rows, pieces, rounding_noise(block, bound))
+    rounded = rounding_noise(block, bound).max(axis=0)
+    noise = noise_beside_tremor(rows, pieces, rounded)
     if angle or noise is not None:
         in_hand = _add_hand_motion(
             source, reduce_to_rows(source, whole=True, level=noise), angle

@@ -8,6 +8,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block, Index
 from fieldcal.model.rows.block_means import mean_of_known
+from fieldcal.physics.grid_stretches import grids_by_stretch
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import noise
 from fieldcal.windows.noise import (
@@ -33,21 +34,29 @@ def noise_of(block: Block, windows: Index, rate_hz: float) -> ChannelNoise:
 
 
 def rounding_noise(block: Block, windows: Index) -> Array:
-    """Standard deviation of rounding alone, from the least change, (6,)."""
-    return least_deviation(np.concatenate(quantisation_steps(block, windows)))
+    """Standard deviation of rounding alone in each window, from the least change.
+
+    (w, 6) for the w windows that hold a sample.
+    """
+    return least_deviation(quantisation_steps(block, windows))
 
 
 def rounding_sigma(block: Block, windows: Index) -> Array:
     """Standard deviation of each window's mean by rounding of the outputs, (w, 6)."""
-    off = []
     steps = quantisation_steps(block, windows)
-    for step, pieces in zip(steps, _pieces(block, windows), strict=True):
-        differences = np.nan_to_num(
-            [short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces]
+    differences = np.concatenate(
+        [
+            np.nan_to_num([short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces])
+            for pieces in _pieces(block, windows)
+        ],
+        axis=1,
+    )
+    deviation: Array = np.sqrt(
+        np.maximum(
+            variance_of_mean(steps, differences),
+            variance_of_few_values(steps, differences),
         )
-        few = variance_of_few_values(step, differences)
-        off.append(np.maximum(variance_of_mean(step, differences), few))
-    deviation: Array = np.sqrt(np.concatenate(off, axis=1))
+    )
     return deviation
 
 
@@ -58,7 +67,7 @@ def shared_rounding_sigma(block: Block, windows: Index, off: Array) -> Array:
     if its noise is smaller than a step.
     """
     out = np.zeros(6)
-    step = quantisation_steps(block, windows)[1]
+    step = quantisation_steps(block, windows)[:, 3:].max(axis=0, initial=0.0)
     _, pieces = _pieces(block, windows)
     mean = np.array([mean_of_known(piece) for piece in pieces])
     sampled = np.nan_to_num([short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces])
@@ -74,15 +83,20 @@ def shared_rounding_sigma(block: Block, windows: Index, off: Array) -> Array:
     return out
 
 
-def quantisation_steps(block: Block, windows: Index) -> tuple[Array, Array]:
-    """Quantisation steps of both triads, (3,) each.
+def quantisation_steps(block: Block, windows: Index) -> Array:
+    """Quantisation step of each output in each window that holds a sample, (w, 6).
 
-    Those of outputs that are constant in all windows are found in the whole recording.
+    Those of outputs that are constant in all windows are found in the whole recording,
+    and those of outputs whose grid changes in the stretches.
     """
     held = np.concatenate([smallest_steps(p) for p in _pieces(block, windows)])
     if not (held > 0).all():
         held = np.where(held > 0, held, grids_of(block))
-    return held[:3], held[3:]
+    steps = [held.copy() for a, b in windows if b > a] or [held]
+    grids = grids_by_stretch(block)
+    for step, (a, b) in zip(steps, (w for w in windows if w[1] > w[0]), strict=False):
+        step[grids.changed] = grids.within(a, b)[grids.changed]
+    return np.array(steps)
 
 
 def _pieces(block: Block, windows: Index) -> Iterator[list[Array]]:

@@ -99,19 +99,25 @@ def _compare_windows(
     )  # outputs may stay on one step all through some
     stands = _never_changes(out, grain)
     out[stands] = np.nan
-    known = np.maximum(np.isfinite(out).sum(axis=0), 1)
-    first = np.sort(out, axis=0)[(known - 1) // 4, np.arange(6)]  # nan comes last
-    low = np.fmax(first, grain)
+    finest = grain.min(axis=0)
+    coarser = grain**2 - finest**2  # what rounding adds in some windows only
+    own = np.sqrt(np.maximum(out**2 - coarser, 0.0))
+    known = np.maximum(np.isfinite(own).sum(axis=0), 1)
+    first = np.sort(own, axis=0)[(known - 1) // 4, np.arange(6)]  # nan comes last
+    usual = np.fmax(first, finest)
+    low = np.sqrt(usual**2 + coarser)
     margin = NOISIER_SIGNIFICANCE / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
     louder = out > low * np.exp(margin)
     loud: Mask = np.any(louder, axis=1)
     quiet = ~loud & ~stands.any(axis=1)
     quiet = quiet if quiet.any() else ~loud if not loud.all() else loud
+    fine = quiet & (coarser == 0).all(axis=1)
+    quiet = fine if fine.any() else quiet
     noise = noise_of(block, windows[quiet], rate_hz)
     white, quick = (
-        np.where(grain > 0, np.fmax(n, grain), n) for n in (noise.white, noise.quick)
+        np.where(finest > 0, np.fmax(n, finest), n) for n in (noise.white, noise.quick)
     )
-    more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0)
+    more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0) + coarser
     return ChannelNoise(white, quick), more, loud
 
 
@@ -119,7 +125,12 @@ def _never_changes(levels: Array, grain: Array) -> Mask:
     """Windows in which an output never changes although its noise exceeds a step.
 
     The output is stuck or saturated there, and has no information on the noise.
-    `levels` (w, 6) are deviations of one sample, `grain` (6,) those within a step.
+
+    Parameters
+    ----------
+    levels : (w, 6) deviation of one sample in each window
+    grain : (w, 6) deviation within a step of the grid that outputs lie on
+
     """
     still: Mask = levels == 0
     usual = [np.median(c[c > 0]) if (c > 0).any() else 0.0 for c in levels.T]

@@ -122,7 +122,8 @@ def find_standing_outputs(
     if not shared_error.any() or not len(windows):
         return None
     means = [block.gyr[a:b].mean(axis=0) for a, b in windows.tolist() if b > a]
-    step = np.where(shared_error > 0, quantisation_steps(block, windows)[1], 0.0)
+    coarsest = quantisation_steps(block, windows).max(axis=0)
+    step = np.where(shared_error > 0, coarsest[3:], 0.0)
     variance = np.mean(rounding_sigma(block, windows)[:, 3:] ** 2, axis=0)
     band = np.where(shared_error > 0, dead_bands(block)[3:], 0.0)
     return StandingOutputs(

@@ -42,9 +42,10 @@ def test_steps_of_each_output() -> None:
     some = step > 0
     block = recorded(step)
     np.testing.assert_allclose(
-        rounding_noise(block, WINDOWS)[some], step[some] / 12**0.5
+        rounding_noise(block, WINDOWS)[:, some],
+        np.tile(step[some] / 12**0.5, (2, 1)),
     )
-    np.testing.assert_array_less(rounding_noise(block, WINDOWS)[~some], 1e-4)
+    np.testing.assert_array_less(rounding_noise(block, WINDOWS)[:, ~some], 1e-4)
     off = rounding_sigma(block, WINDOWS)
     assert off.shape == (2, 6), "of windows that hold samples"
     np.testing.assert_array_less(off[:, ~some], 1e-8)
@@ -59,8 +60,8 @@ def test_a_step_that_only_a_turn_shows() -> None:
     """A step that the noise nowhere crosses in a window is seen on the way."""
     block = recorded(np.repeat([1.0, 0.0], 3))
     grain = rounding_noise(block, WINDOWS)
-    np.testing.assert_allclose(grain[:3], 1.0 / 12**0.5)
-    assert (grain[3:] < 1e-6).all()
+    np.testing.assert_allclose(grain[:, :3], np.full((2, 3), 1.0 / 12**0.5))
+    assert (grain[:, 3:] < 1e-6).all()
 
 
 def test_the_more_noise_the_less_rounding_is_left() -> None:

@@ -30,6 +30,7 @@ from fieldcal.session.installed_calibration import (
 from fieldcal.session.marks import read_marks
 
 TURNED = {"alpha_deg": 45, "beta_deg": 5}
+VERIFIED = {"alpha_deg": 0, "beta_deg": 5}
 
 
 def order(control: str, **request: Any) -> None:
@@ -57,7 +58,8 @@ def restarted(
 ) -> Iterator[tuple[Path, str, str, dict[str, Any]]]:
     """A run across two starts of its autopilot; the latter while a window is taken.
 
-    The session, the autopilot's address, its control socket, and what it conceals.
+    No turn of it was recorded, so that a position that is not fitted bears witness. The
+    session, the autopilot's address, its control socket, and what it conceals.
     """
     folder = tmp_path_factory.mktemp("restarted")
     session, truth = folder / "s", folder / "truth.json"
@@ -67,7 +69,7 @@ def restarted(
     with simulated(*sim) as (place, control):
         url = f"mavlink:{place}"
         run = [*TWO_POSITION, "--gravity=9.81", "--seconds", "20", "--json"]
-        run += ["-o", str(session)]
+        run += ["--verify", "-o", str(session)]
         with subprocess.Popen(
             [*run, "--device", f"{url}?rate=100"], stdout=subprocess.PIPE, text=True
         ) as process:
@@ -76,6 +78,8 @@ def restarted(
             order(control, turn=TURNED)
             wait(process, lambda: len(events(session, "asked")) == 2)
             order(control, fault={"reboot_s": 3.0})
+            wait(process, lambda: len(events(session, "window")) == 2)
+            order(control, turn=VERIFIED)
             printed, _ = process.communicate()
         assert process.returncode == 0, json.loads(printed)["decision"]["reasons"]
         conceals = json.loads(truth.read_text())

@@ -3,13 +3,14 @@
 A line that both recordings have can rise above the noise of a channel in one of them
 only. There, its amplitude is measured in the other too: it is not taken for zero. So is
 a touch that only one shows no difference if the other has a slip or a jump at that
-instant: both are parts of one event.
+instant: both are parts of one event. A line at the frequency of one of another name is
+told by that name: a base that sways by little is a hum, where its force is below noise.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,8 +55,9 @@ def compare_lines_and_faults(
     differences, alike : what differs, and the ids of what both have with the same size
 
     """
-    ours, theirs = _found_in_samples(real), _found_in_samples(sim)
+    theirs = _found_in_samples(sim)
     length = min(float(np.ptp(s.block.t)) for s in (real, sim))
+    ours = [_as_named_by(f, theirs, real, length) for f in _found_in_samples(real)]
     apart: list[Difference] = []
     alike: list[str] = []
     for one in ours:
@@ -75,6 +77,44 @@ def compare_lines_and_faults(
         alike += [] if found else [two.id]
     differing = {d.id for d in apart}
     return apart, tuple(dict.fromkeys(n for n in alike if n not in differing))
+
+
+def _as_named_by(
+    one: FoundEffect,
+    others: Sequence[FoundEffect],
+    source: DiagnosedRecording,
+    length: float,
+) -> FoundEffect:
+    """A line of `source` as the one that `others` have at its frequency, if any."""
+    if any(_is_same(one, other, length) for other in others):
+        return one
+    named = next((f for f in others if _same_frequency(one, f, length)), None)
+    if named is None:
+        return one
+    effect, prepared = catalogue()[named.id], source.explanation.prepared
+    if not isinstance(effect, Line):
+        return one
+    # lines that were found are no longer in the samples that rows are made of
+    whole = replace(prepared.source, block=prepared.checked.block)
+    pieces = samples_of_windows(whole, source.explanation.rows)
+    if not pieces.samples:
+        return one
+    hz = one.parameters["hz"]
+    values, sigmas = measured_amplitudes(pieces, effect, float(hz.value))
+    sizes = {
+        n: Quantity(values[n], sigmas[n], q.unit)
+        for n, q in named.parameters.items()
+        if n in values
+    }
+    return replace(one, id=named.id, parameters={**sizes, "hz": hz})
+
+
+def _same_frequency(one: FoundEffect, two: FoundEffect, length: float) -> bool:
+    """Whether both are lines, at one frequency."""
+    if "hz" not in one.parameters or "hz" not in two.parameters:
+        return False
+    off = float(one.parameters["hz"].value) - float(two.parameters["hz"].value)
+    return abs(off) < APART_HZ / length + 3 * _combined_sigma(one, two, "hz")
 
 
 def _is_of_event(
@@ -187,8 +227,7 @@ def _is_same(one: FoundEffect, two: FoundEffect, length: float) -> bool:
     if one.id != two.id:
         return False
     if "hz" in one.parameters and "hz" in two.parameters:
-        off = float(one.parameters["hz"].value) - float(two.parameters["hz"].value)
-        return abs(off) < APART_HZ / length + 3 * _combined_sigma(one, two, "hz")
+        return _same_frequency(one, two, length)
     words = {n for n, q in one.parameters.items() if isinstance(q.value, str)}
     return all(
         n in two.parameters and two.parameters[n].value == one.parameters[n].value

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 from fieldcal.diagnosis.findings.found_effects import merge_turned_parameters
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.effects import catalogue
+from fieldcal.model.causes.cause import Group
 
 EFFECT = catalogue()["cross_coupling"]
 NAMES = [p.name for p in EFFECT.params]  # k12 k13 k21 k23 k31 k32
@@ -20,7 +20,8 @@ PRIOR = 0.02
 def merged(taken: tuple[str, ...], covariance: np.ndarray[Any, Any]) -> Any:
     """What is told of the parameters that a search took, each 0.001 times its place."""
     at = tuple(NAMES.index(name) for name in taken)
-    group: Any = SimpleNamespace(effect=EFFECT, params=at)
+    columns = np.arange(len(at))
+    group = Group(EFFECT.id, "", columns, np.ones(len(at)), EFFECT, params=at)
     value = 1e-3 * (np.array(at) + 1)
     sigma = np.sqrt(np.diag(covariance))
     own = {

@@ -54,7 +54,8 @@ def test_white_noise_falls_with_the_root_of_the_time(tmp_path: Path) -> None:
     k = [made.names.index(f"acc_bias.{axis}") for axis in "xyz"]
     fall = made.noise[0, k] / made.noise[-1, k]
     assert fall == pytest.approx(np.sqrt(12.0), rel=0.3)
-    assert {made.dominant_error(f"acc_bias.{axis}") for axis in "xy"} == {None}
+    late = ("fixture", 60.0)  # what a factory leaves is as large as noise then
+    assert {made.dominant_error(f"acc_bias.{axis}") for axis in "xy"} <= {None, late}
     assert made.dominant_error("acc_bias.z") == ("fixture", 10.0), (
         "of a base off by 0.05 deg"
     )

@@ -246,8 +246,8 @@ def test_angles_that_nobody_sets_so_are_those_of_other_positions(
 ) -> None:
     """Their size was refused as an option that nobody had given."""
     monkeypatch.setattr(angle_setting, "shown_angle_setting", lambda _: size)
-    said = places([FACES[i] for i in (0, 2, 1, 3, 4, 5)])
-    write_session(tmp_path, recorded(CALM, places(FACES)), said, site=SITE)
+    there = np.random.default_rng(5).uniform(-90.0, 90.0, (6, 2)).tolist()
+    write_session(tmp_path, recorded(CALM, places(there)), places(FACES), site=SITE)
     assert main(["solve", str(tmp_path), "--json"]) == 1
     out: dict[str, Any] = json.loads(capsys.readouterr().out)
     assert out["verdict"] == "bad" or not other

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet, widen_set
 from fieldcal.diagnosis.explain import Explanation
@@ -73,7 +75,7 @@ class CausePairing:
         return kept, taken
 
     def with_shape_of(self, key: str) -> list[tuple[WidenedSet, WidenedSet]]:
-        """Both sessions with one cause at the shape of the one, then of the other.
+        """Both sessions with one cause at the shape of the one, the other, and both.
 
         Empty if the cause has no shape, or if only one session found it.
         """
@@ -88,7 +90,31 @@ class CausePairing:
         at_ours = widen_set(self.sim.explanation, others, [mine], self.later)
         ours = [m for m in self.ours if m is not mine]
         at_theirs = widen_set(self.real.explanation, ours, [yours], -self.later)
-        return [(real, at_ours), (at_theirs, sim)]
+        out = [(real, at_ours), (at_theirs, sim)]
+        if (both := _shape_of_both(mine[1], yours[1])) is not None:
+            member = (mine[0], both)
+            out.append(
+                (
+                    widen_set(self.real.explanation, ours, [member], 0.0),
+                    widen_set(self.sim.explanation, others, [member], self.later),
+                )
+            )
+        return out
+
+
+def _shape_of_both(mine: Group, yours: Group) -> Group | None:
+    """A cause at the time constant that both sessions show, by their uncertainties.
+
+    None if one of them does not tell it, or if its shape is an instant.
+    """
+    sigma = np.array([mine.shape_sigma, yours.shape_sigma])
+    if mine.begins_at_instant or len(mine.shape) != 1 or not np.isfinite(sigma).all():
+        return None
+    (name,) = mine.shape
+    value = np.array([mine.shape[name], yours.shape[name]])
+    weight = np.square(value / np.maximum(sigma, 1e-9 * value))
+    mean = float(np.exp(np.average(np.log(value), weights=weight)))
+    return replace(mine, shape={name: mean})
 
 
 def _best_members(explanation: Explanation) -> list[Member]:

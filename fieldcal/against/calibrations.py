@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fieldcal.against.cause_values import cause_quantities
-from fieldcal.against.one_device import CalibrationGroup, SideOfDevice
+from fieldcal.against.one_device import GroupBesideEffect, SideOfDevice
 from fieldcal.against.widened import WidenedSet
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
@@ -54,11 +54,11 @@ def sides_of_device(
 
 def _beside_effect(
     there: WidenedSet, name: str, axes: Index, key: str
-) -> CalibrationGroup:
+) -> GroupBesideEffect:
     """A group of one session's calibration beside an effect."""
     values, covariance, slope = there.beside_effect(key, _first(there, name) + axes)
     covariance_without = covariance + _wander(there.without(key), name, axes)
-    return CalibrationGroup(
+    return GroupBesideEffect(
         values + _nominal(there, name)[axes],
         covariance_without,
         slope,

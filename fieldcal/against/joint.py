@@ -90,6 +90,14 @@ class EffectInformation:
             evidence_gains(self.inner, self.rhs, self.largest_diagonal)
         )
 
+    def with_same(self, other: EffectInformation) -> EffectInformation:
+        """Information of both sessions together, which have the same effect, of (3)."""
+        return EffectInformation(
+            self.inner + other.inner,
+            self.rhs + other.rhs,
+            self.largest_diagonal + other.largest_diagonal,
+        )
+
     @property
     def shows(self) -> bool:
         """Whether the session could show an effect of typical size at all."""
@@ -158,12 +166,7 @@ def evidence_of_same(real: EffectInformation, sim: EffectInformation) -> float:
     """Ln evidence of one and the same effect in both sessions (3)."""
     if real.inner.shape != sim.inner.shape:
         return -np.inf
-    there = evidence_gains(
-        real.inner + sim.inner,
-        real.rhs + sim.rhs,
-        real.largest_diagonal + sim.largest_diagonal,
-    )
-    return over_sizes(there) + real.shift + sim.shift
+    return over_sizes(real.with_same(sim).gain) + real.shift + sim.shift
 
 
 def evidence_of_proportional(

@@ -36,7 +36,7 @@ from fieldcal.model.priors import SIZES
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationGroup:
+class GroupBesideEffect:
     """Biases or scale factors of one triad in one session, beside an effect.
 
     Attributes
@@ -54,7 +54,7 @@ class CalibrationGroup:
     wander: Array
     typical: Array
 
-    def having(self, told: EffectInformation, size: float) -> CalibrationGroup:
+    def having(self, told: EffectInformation, size: float) -> GroupBesideEffect:
         """The group with the effect at a size, of which the session tells `told`."""
         spread = np.linalg.inv(told.inner + np.eye(len(told.rhs)) / size**2)
         return replace(
@@ -77,7 +77,7 @@ class SideOfDevice:
 
     """
 
-    groups: Sequence[CalibrationGroup]
+    groups: Sequence[GroupBesideEffect]
     told: EffectInformation | None
 
     def having(self, size: float) -> SideOfDevice:
@@ -114,11 +114,7 @@ def evidence_of_one_device(
             lambda v: evidence(real.having(v), sim.having(v)),
         )
     elif real.told.inner.shape == sim.told.inner.shape:
-        both = EffectInformation(
-            real.told.inner + sim.told.inner,
-            real.told.rhs + sim.told.rhs,
-            real.told.largest_diagonal + sim.told.largest_diagonal,
-        )
+        both = real.told.with_same(sim.told)
         apart = SideOfDevice(list(map(_apart, real.groups, sim.groups)), both)
         none = SideOfDevice([_nothing(g) for g in apart.groups], None)
         out["same"] = _under_integral(
@@ -133,7 +129,7 @@ def _likeliest_size(side: SideOfDevice) -> float:
     return float(SIZES[np.argmax(side.told.gain)])
 
 
-def _apart(ours: CalibrationGroup, theirs: CalibrationGroup) -> CalibrationGroup:
+def _apart(ours: GroupBesideEffect, theirs: GroupBesideEffect) -> GroupBesideEffect:
     """The difference of two groups, beside an effect that both have alike."""
     return replace(
         ours,
@@ -143,7 +139,7 @@ def _apart(ours: CalibrationGroup, theirs: CalibrationGroup) -> CalibrationGroup
     )
 
 
-def _nothing(of: CalibrationGroup) -> CalibrationGroup:
+def _nothing(of: GroupBesideEffect) -> GroupBesideEffect:
     return replace(
         of, values=np.zeros_like(of.values), covariance=np.zeros_like(of.covariance)
     )

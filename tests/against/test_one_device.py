@@ -21,7 +21,7 @@ from fieldcal.against.joint import (
     relation_probabilities,
 )
 from fieldcal.against.one_device import (
-    CalibrationGroup,
+    GroupBesideEffect,
     SideOfDevice,
     evidence_of_one_device,
 )
@@ -42,10 +42,10 @@ class Side:
 
     rows: Array
 
-    def group(self) -> CalibrationGroup:
+    def group(self) -> GroupBesideEffect:
         """Scale factors, by conditioning dense Gaussians."""
         gain = SCALE**2 * np.linalg.inv((SIGMA**2 + SCALE**2) * np.eye(AXES))
-        return CalibrationGroup(
+        return GroupBesideEffect(
             gain @ self.rows,
             SCALE**2 * (np.eye(AXES) - gain),
             gain @ COMMON * GRAVITY,
@@ -169,7 +169,7 @@ def test_a_random_effect_that_wanders_is_in_the_difference_of_biases() -> None:
     told = EffectInformation(np.zeros((1, 1)), np.zeros(1), 0.0)
 
     def side(value: float, wander: float) -> SideOfDevice:
-        group = CalibrationGroup(
+        group = GroupBesideEffect(
             np.array([value]), 1e-4 * wide, np.zeros((1, 1)), wander * wide,
             np.ones(1),
         )  # fmt: skip

@@ -52,7 +52,7 @@ def common_unit(names: Iterable[str]) -> str | None:
     return units.pop() if len(units) == 1 else None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True, eq=False)
 class Block:
     """Consecutive samples of one IMU, uncalibrated; nan where a value is unknown.
 

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.once import once_per_block
 from fieldcal.core.samples import Array, Block, runs_of_true
 from fieldcal.physics.recording import (
     MIN_GRID_GAPS,
@@ -57,6 +58,7 @@ Stretch = tuple[int, int, float]
 """First and one past the last sample of a stretch on one grid, and its step."""
 
 
+@once_per_block
 def grids_by_stretch(block: Block) -> Grids:
     """Grids of the outputs of a recording, a stretch for each."""
     whole = grids_of(block)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.once import once_per_block
 from fieldcal.core.samples import Array, Block
 from fieldcal.physics.experience import Experience
 
@@ -220,13 +221,16 @@ MIN_GRID_VALUES = 4
 """Values of an output below which they show no grid by themselves."""
 
 
+@once_per_block
 def grids_of(block: Block) -> Array:
     """Step of the grid of each output, (6,), 0 where values lie on none.
 
     An output that shows but one or two values all through has that of its sensor's
     other axes; where none of them shows more, the least change among them.
     """
-    return np.concatenate([_grids(triad) for triad in (block.acc, block.gyr)])
+    steps = np.concatenate([_grids(triad) for triad in (block.acc, block.gyr)])
+    steps.setflags(write=False)
+    return steps
 
 
 def _grids(triad: Array) -> Array:

@@ -229,7 +229,10 @@ def _removed_biases(
         limits.gyr_bias_repeat, subtracts_gyro_offset(session.marks())
     )
     repeat = limits.acc_bias_repeat, gyroscopes
-    return removed_bias_sentences(held, session.block, repeat, seen, limits.fit_chance)
+    return removed_bias_sentences(
+        held, session.block, repeat, seen, limits.fit_chance,
+        calibration.vector("gyr_bias"),
+    )  # fmt: skip
 
 
 def store_in_history(

@@ -55,9 +55,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.acceptance.zero_rates import (
+    log_odds_of_no_bias,
+    zero_rates,
+)
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.probability import chi2_tail, probability_of_log_odds
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import GYR, UNITS, Array, Block, Index
 from fieldcal.windows import Average
 
 MIN_WINDOWS = 2
@@ -84,6 +88,8 @@ MOVED, MOVED_S = 2e-3, 0.25
 """Spread of mean rates over so long, rad/s and s, beyond which a device moves: 0.1
 deg/s. A hand makes 5e-3 to 2e-2, and noise of a low-cost gyroscope at rest 6e-4."""
 
+UNKNOWN = np.full(3, np.nan)
+
 SPECTRUM, OCTAVES, FILTERS = 16, 4, 4.0
 """Fewest samples of a periodogram and powers of an octave; number of octaves; standard
 deviations by which an octave below the band of a filter has more power."""
@@ -105,27 +111,47 @@ class BiasSpread:
 
 
 def bias_removal_probability(
-    windows: Sequence[Average], block: Block, keeps: BiasSpread, least: float
+    windows: Sequence[Average],
+    block: Block,
+    keeps: BiasSpread,
+    least: float,
+    seen: tuple[Array, Array] = (UNKNOWN, UNKNOWN),
 ) -> tuple[float, str]:
     """Probability that the device subtracts its bias at rest, (5), and chi2 in words.
 
     0 if the means differ significantly from zero, if there are too few, or if a hand
-    holds the device.
+    holds the device. `seen` are estimated biases and their errors, (3,) each, rad/s.
+    They count on axes that read zero in all samples at rest (`zero_rates`).
     """
-    held = [block.between(w.start, w.end) for w in windows]
-    if _never_rests(held):
+    held = [one for w in windows if len(one := block.between(w.start, w.end))]
+    if _never_rests(held) or len(held) < MIN_WINDOWS:
         return 0.0, ""
-    cells = [_WindowCells.of(one) for one in held if len(one) >= SPECTRUM]
+    zero = zero_rates(held)
+    bias, sigma = (part[zero] for part in seen)
+    log_odds = log_odds_of_no_bias(bias, sigma, keeps.repeat)
+    if keeps.averaged:
+        log_odds -= float(np.logaddexp(log_odds, 0.0) - np.log(2.0))
+    log_odds += np.log(TRACKING)
+    if zero.all():
+        return float(probability_of_log_odds(log_odds)), "(all samples are zero)"
+    return _removal_behind_noise(held, np.flatnonzero(~zero), keeps, least, log_odds)
+
+
+def _removal_behind_noise(
+    held: Sequence[Block], axes: Index, keeps: BiasSpread, least: float, prior: float
+) -> tuple[float, str]:
+    """The probability with that of some axes, from prior log odds, and chi2."""
+    cells = [_WindowCells.of(one, axes) for one in held if len(one) >= SPECTRUM]
     if not cells:
         return 0.0, ""
     second = np.median([one.noise_of_a_second for one in cells], axis=0)
     left = [second / np.sqrt(s) for s in LAGS] if keeps.averaged else []
-    biases = [np.full(3, keeps.repeat), *left]
+    biases = [np.full(len(axes), keeps.repeat), *left]
     stays = _KeptBias(keeps.repeat, biases)
     settled, own = _settled_means(cells)
-    found = [_removal_probability(settled, own, [own], stays, least)]
+    found = [_removal_probability(settled, own, [own], stays, least, prior)]
     found += [
-        _removal_probability(means, own, every, stays, least)
+        _removal_probability(means, own, every, stays, least, prior)
         for means, own, every in _zeroed_means(cells)
     ]
     return max(found)
@@ -144,11 +170,20 @@ def _never_rests(held: Sequence[Block]) -> bool:
 
 
 def _removal_probability(
-    means: Array, own: Array, every: Sequence[Array], keeps: _KeptBias, least: float
+    means: Array,
+    own: Array,
+    every: Sequence[Array],
+    keeps: _KeptBias,
+    least: float,
+    prior: float,
 ) -> tuple[float, str]:
-    """Probability (5) for means about zero, whose error is one of `every`."""
+    """Probability (5) for means about zero, whose error is one of `every`.
+
+    `prior` are the log odds of a device that subtracts its bias.
+    """
     seen = np.isfinite(means) & (own > 0)
-    if (count := int(seen.sum())) < 3 * MIN_WINDOWS or not seen.any(axis=0).all():
+    count, axes = int(seen.sum()), means.shape[1]
+    if count < axes * MIN_WINDOWS or not seen.any(axis=0).all():
         return 0.0, ""
     sigma = min(
         every, key=lambda one: _minus_two_log_likelihood(means[seen], one[seen])
@@ -160,7 +195,7 @@ def _removal_probability(
         [-0.5 * _minus_two_log_likelihood(means[seen], one[seen]) for one in every]
     )
     stays = keeps.likelihood(means, own, seen)
-    odds = zero - stays + np.log(TRACKING)  # (5)
+    odds = zero - stays + prior  # (5)
     chance = float(probability_of_log_odds(odds))
     return chance, f"(χ² about zero {chi2:.2g} of {count} means)"
 
@@ -245,12 +280,13 @@ class _KeptBias:
     def _likelihood_of_spread(
         self, bias: Array, means: Array, own: Array, seen: NDArray[np.bool_]
     ) -> float:
+        whole = seen.all() and seen.shape[1] == len(UNITS[GYR])
         ways = [
             self._likelihood_of_dependence(bias, means, own, seen, part)
             for part in POSITION_DEPENDENCE
         ]
         return _log_mean_exp(
-            [*ways, *([_earth_rate_log_likelihood(means, own)] if seen.all() else [])]
+            [*ways, *([_earth_rate_log_likelihood(means, own)] if whole else [])]
         )
 
     def _likelihood_of_dependence(
@@ -284,8 +320,8 @@ class _WindowCells:
     Attributes
     ----------
     t : (k,) s since the window began
-    gyr : (k, 3) rad/s
-    noise : (3,) rad/s, white noise of each mean
+    gyr : (k, a) rad/s, of some axes
+    noise : (a,) rad/s, white noise of each mean
 
     """
 
@@ -294,17 +330,17 @@ class _WindowCells:
     noise: Array
 
     @classmethod
-    def of(cls, one: Block) -> _WindowCells:
-        """The means of a window, at most `CELLS`.
+    def of(cls, one: Block, axes: Index) -> _WindowCells:
+        """The means of a window, at most `CELLS`, of some axes.
 
         The mean of an exponential over a cell is its value in the middle, times the
         same factor for all cells.
         """
         each = -(-len(one) // CELLS)
         count = len(one) // each
-        t, gyr = one.t[: count * each] - one.t[0], one.gyr[: count * each]
-        level = _white_noise(one.gyr) / np.sqrt(each)
-        means = gyr.reshape(count, each, 3).mean(axis=1)
+        t, gyr = one.t[: count * each] - one.t[0], one.gyr[: count * each, axes]
+        level = _white_noise(one.gyr[:, axes]) / np.sqrt(each)
+        means = gyr.reshape(count, each, len(axes)).mean(axis=1)
         return cls(t.reshape(count, each).mean(axis=1), means, level)
 
     @property
@@ -320,7 +356,7 @@ class _WindowCells:
         fit = inner @ (design.T @ self.gyr)
         left = ((self.gyr - design @ fit) ** 2).sum(axis=0)
         some = self.noise > 0
-        chi2 = np.divide(left, self.noise**2, out=np.zeros(3), where=some)
+        chi2 = np.divide(left, self.noise**2, out=np.zeros(len(some)), where=some)
         return fit[0], self.noise * np.sqrt(inner[0, 0]), chi2
 
 

@@ -37,6 +37,7 @@ import numpy as np
 
 from fieldcal.acceptance.bias_removal import (
     DOUBT,
+    UNKNOWN,
     BiasSpread,
     bias_removal_probability,
     chance_near_zero,
@@ -53,6 +54,7 @@ def removed_bias_sentences(
     repeat: tuple[float, BiasSpread],
     seen: Array,
     least: float,
+    gyro_biases: tuple[Array, Array] = (UNKNOWN, UNKNOWN),
 ) -> list[str]:
     """Sentences about biases that were subtracted from the recording.
 
@@ -64,10 +66,13 @@ def removed_bias_sentences(
         gyroscope's
     seen : (3,) estimated biases of the accelerometers, m/s^2; 0 if there is none
     least : probability below which chance is excluded
+    gyro_biases : estimated biases of the gyroscopes and their errors, rad/s, (3,) each
 
     """
     said = []
-    removes, what = bias_removal_probability(windows, block, repeat[1], least)
+    removes, what = bias_removal_probability(
+        windows, block, repeat[1], least, gyro_biases
+    )
     if removes > DOUBT:
         said.append(
             "the gyroscopes' means at rest are zero within their noise, with neither a"

@@ -244,13 +244,13 @@ def test_a_mean_that_was_taken_before_rounding(mode: str) -> None:
     for _ in range(20):
         windows, block = faces(rng, 0.05)
         own = block.acc.copy()
-        block.acc[:] = ROUNDED[mode](own)
+        block = replace(block, acc=ROUNDED[mode](own))
         assert rounded_mean_probability(windows, block, 0.05, LEAST) > LEAST
-        block.acc[:] = ROUNDED[mode](own - own.mean(axis=0))
+        block = replace(block, acc=ROUNDED[mode](own - own.mean(axis=0)))
         assert all(p > LEAST for _, p in mean_probabilities(block))
         found.append(rounded_mean_probability(windows, block, 0.05, LEAST))
     assert np.mean(np.array(found) < LEAST) > 0.6
-    block.acc[:] += 1e-3 * rng.standard_normal(block.acc.shape)
+    block = replace(block, acc=block.acc + 1e-3 * rng.standard_normal(block.acc.shape))
     assert rounded_mean_probability(windows, block, 0.05, LEAST) == 1.0
 
 
@@ -312,6 +312,61 @@ def test_of_gyroscopes_with_biases_hardly_any_are_taken_for_such_a_device(
     assert taken <= 0.01 * count
 
 
+def all_zero(biased: int = 0) -> tuple[list[Average], Block]:
+    """Six windows of zeros; the first axes have noise about a bias instead."""
+    windows, block = at_rest(np.random.default_rng(21), 1e-3)
+    block.gyr[:, biased:] = 0.0
+    return windows, block
+
+
+def test_zeros_at_rest_count_by_the_biases_that_turns_show() -> None:
+    """Behind a coarse step all of them are zero; the bias in the turns tells."""
+    windows, block = all_zero()
+    bias, sigma = np.array([3e-4, -1e-4, 0.0]), np.array([2e-4, 3e-4, 2e-4])
+    ratio = np.prod(
+        norm.pdf(bias, scale=sigma) / norm.pdf(bias, scale=np.hypot(sigma, REPEAT))
+    )
+    expected = TRACKING * ratio / (1 + TRACKING * ratio)
+    seen = bias, sigma
+    chance, what = bias_removal_probability(windows, block, KEEPS, LEAST, seen)
+    assert DOUBT < chance == pytest.approx(expected) and "all samples are zero" in what
+    for other in (bias + [2e-3, 0.0, 0.0], np.full(3, np.nan)):
+        found = bias_removal_probability(windows, block, KEEPS, LEAST, (other, sigma))
+        assert found[0] <= TRACKING
+    averaged = BiasSpread(REPEAT, averaged=True)
+    odds = TRACKING * ratio / ((ratio + 1) / 2)
+    found = bias_removal_probability(windows, block, averaged, LEAST, seen)
+    assert found[0] == pytest.approx(odds / (1 + odds))
+
+
+def test_an_axis_with_a_bias_beside_axes_of_zeros_keeps_it() -> None:
+    sigma = np.full(3, 1e-5)
+    for biased, keeps in ((0, False), (1, True)):
+        windows, block = all_zero(biased)
+        seen = block.gyr.mean(axis=0), sigma
+        chance, _ = bias_removal_probability(windows, block, KEEPS, LEAST, seen)
+        assert (chance < 0.01) == keeps
+    windows, block = at_rest(np.random.default_rng(22), 0.0)  # noise about zero
+    block.gyr[:, 1:] = 0.0
+    chance, what = bias_removal_probability(
+        windows, block, KEEPS, LEAST, (np.zeros(3), sigma)
+    )
+    assert chance > 0.9 and "of 6 means" in what
+
+
+def test_few_of_gyroscopes_with_biases_read_zero_and_are_taken_for_such() -> None:
+    """By Markov, at most one in as many as the likelihood ratio at which it is said."""
+    rng, said, count = np.random.default_rng(23), 0, 3000
+    windows, block = all_zero()
+    odds = DOUBT / (1 - DOUBT) / TRACKING
+    for sigma in rng.choice([3e-4, 1e-4, 1e-5], count):
+        bias = rng.normal(0, np.hypot(sigma, REPEAT), 3)
+        seen = bias, np.full(3, sigma)
+        found = bias_removal_probability(windows, block, KEEPS, LEAST, seen)
+        said += found[0] > DOUBT
+    assert 0 < said / count < 1 / odds
+
+
 def test_windows_without_noise_or_without_an_axis_do_not_count() -> None:
     windows, block = at_rest(np.random.default_rng(3), 0.0)
     block.gyr[COUNT : 2 * COUNT] = 0.0
@@ -365,11 +420,15 @@ def test_the_chance_of_a_mean_that_rounding_leaves_is_as_written(mode: str) -> N
     assert 0 < expected < 1 and found == pytest.approx(expected, rel=0.05)
     large = np.array([1.0, 1.0, 1e3]) * spread  # a bias that is found on one axis
     assert rounded_mean_probability(windows, block, large, LEAST) < 0.02 * found
-    block.acc[5, 1] = np.nan
-    assert rounded_mean_probability(windows, block, spread, LEAST) == 1.0
-    block.acc[5, 1] = 0.0
-    block.acc[:, 0] += 1e-3 * rng.standard_normal(len(acc))
-    assert rounded_mean_probability(windows, block, spread, LEAST) == 1.0
+    acc[5, 1] = np.nan
+    assert (
+        rounded_mean_probability(windows, replace(block, acc=acc), spread, LEAST) == 1.0
+    )
+    acc[5, 1] = 0.0
+    acc[:, 0] += 1e-3 * rng.standard_normal(len(acc))
+    assert (
+        rounded_mean_probability(windows, replace(block, acc=acc), spread, LEAST) == 1.0
+    )
 
 
 def test_few_digits_of_what_was_on_a_grid_of_its_own() -> None:
@@ -378,9 +437,9 @@ def test_few_digits_of_what_was_on_a_grid_of_its_own() -> None:
     for _ in range(20):
         windows, block = faces(rng, 0.05)
         own = np.round(block.acc / 2.39e-3) * 2.39e-3
-        block.acc[:] = np.round(own, 3)
+        block = replace(block, acc=np.round(own, 3))
         assert rounded_mean_probability(windows, block, 0.05, LEAST) > LEAST
-        block.acc[:] = np.round(own - own.mean(axis=0), 3)
+        block = replace(block, acc=np.round(own - own.mean(axis=0), 3))
         assert rounded_mean_probability(windows, block, 0.05, LEAST) < LEAST
 
 
@@ -397,9 +456,9 @@ def test_few_digits_of_what_was_on_the_same_grid_move_all_alike(
     for _ in range(20):
         windows, block = faces(rng, 0.05)
         own = np.round(block.acc / step) * step
-        block.acc[:] = own
+        block = replace(block, acc=own)
         assert rounded_mean_probability(windows, block, 0.05, LEAST) > LEAST
-        block.acc[:] = np.round((own - own.mean(axis=0)) / step) * step
+        block = replace(block, acc=np.round((own - own.mean(axis=0)) / step) * step)
         left.append(np.abs(block.acc.mean(axis=0)).max())
         found = rounded_mean_probability(windows, block, 0.05, LEAST)
         assert (found < LEAST) == shows

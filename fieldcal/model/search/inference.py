@@ -97,11 +97,14 @@ class Inference:
         search = self._search_about(state, values, None)
         known = () if begin is None else dictionary.match_members(begin)
         best = drop_superfluous(search.sets, known) if begin is not None else None
+        rivals: tuple[Set, ...] = ()
         if best is None or (begin and not best.members):
-            state, values, best = self._search_from_nominal(state, values, search)
+            state, values, best, rivals = self._search_from_nominal(
+                state, values, search
+            )
         about = dict.fromkeys([best, search.sets.evaluate(())])
         dictionary.add_causes(proportional_causes(dictionary, list(about)))
-        return self._iterate(state, values, best, thorough=begin is None)
+        return self._iterate(state, values, best, begin is None, rivals=rivals)
 
     def run_from(self, better: Set, visited_keys: frozenset[SetKey]) -> InferenceResult:
         """Search from a set until set and state no longer change.
@@ -143,16 +146,17 @@ class Inference:
         best: Set,
         thorough: bool,
         visited_keys: frozenset[SetKey] = frozenset(),
+        rivals: Sequence[Set] = (),
     ) -> InferenceResult:
         """Update the state and search in turn, starting from the set `best`.
 
         If `thorough`, costly changes are tried once cheap ones find nothing. A set
-        whose key is in `visited_keys` ends it.
+        whose key is in `visited_keys` ends it. The sets `rivals` are evaluated as well.
         """
         fit = self.fit
         members: tuple[Member, ...] = ()
         visited = set(visited_keys)
-        earlier: dict[tuple[Member, ...], None] = {}
+        earlier = dict.fromkeys(one.members for one in rivals)
         for _ in range(MAX_LINEARISATIONS):
             visited.add(Sets.key(best.members))
             if best.members != members:
@@ -195,9 +199,13 @@ class Inference:
 
     def _search_from_nominal(
         self, state: State, values: Array, search: Search
-    ) -> tuple[State, Array, Set]:
-        """The best set about the nominal state, or about another starting set."""
+    ) -> tuple[State, Array, Set, tuple[Set, ...]]:
+        """The best set about the nominal state, or about another starting set.
+
+        With the state, the columns' values in it, and what other starts led to.
+        """
         best = (state, values, search.run(thorough=False))
+        found = [best[2]]
         turn_rows = self.fit.turn_rows
         for start in starting_sets(self.fit, search, best[2]):
             state_there, values_there, _ = self.fit.settle(
@@ -205,11 +213,12 @@ class Inference:
             )
             about = self._search_about(state_there, values_there, None)
             candidate = about.run(start.members, thorough=False)
+            found.append(candidate)
             if candidate.score > best[2].score:
                 best = (state_there, values_there, candidate)
                 turn_rows = self.fit.turn_rows
         self.fit.turn_rows = turn_rows
-        return best
+        return *best, tuple(one for one in found if one is not best[2])
 
 
 def resume(better: Set, before: InferenceResult) -> InferenceResult:

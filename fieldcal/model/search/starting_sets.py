@@ -15,13 +15,15 @@ from fieldcal.core.samples import GYR
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Gram
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.selection import Search
+from fieldcal.model.search.variations import score_of
 from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.physics.attitude_step import AttitudeStep
+from fieldcal.physics.effect import BiasChange
 
 LARGE_INSTABILITY = 4.0
 """Instability, in typical ones, above which causes may hide that show only together."""
@@ -35,6 +37,7 @@ def starting_sets(fit: GaussNewton, search: Search, best: Set) -> Iterator[Set]:
     yield from sets_with_large_turns(search)
     if elsewhere := _positions_elsewhere(fit):
         yield search.sets.evaluate(elsewhere)
+    yield from _restarts(search.sets)
     usual = tuple((c, c.variants[0]) for c in fit.dictionary.causes if c.usual)
     keys = {c.key for c, _ in usual}
     instability = priors.SIZES[list(best.sizes.instability)]
@@ -97,6 +100,22 @@ def _positions_elsewhere(fit: GaussNewton) -> tuple[Member, ...]:
     if 2 * len(far) >= len(causes):  # then the device is what is different
         return ()
     return tuple((c, c.variants[0]) for c in far)
+
+
+def _restarts(sets: Sets) -> Iterator[Set]:
+    """The set in which all biases jump in the likeliest of the gaps, if there is one.
+
+    Step by step it is not found where something else, such as wrong angles, explains
+    the jump of one triad: beside that, no row needs the jump.
+    """
+    jumps: dict[float, tuple[Member, ...]] = {}
+    for cause in sets.dictionary.causes:
+        for group in cause.expected:
+            if isinstance(group.effect, BiasChange):
+                (at_s,) = group.shape.values()
+                jumps[at_s] = (*jumps.get(at_s, ()), (cause, group))
+    if jumps:
+        yield max(map(sets.evaluate, jumps.values()), key=score_of)
 
 
 def _turns_need_usual_causes(

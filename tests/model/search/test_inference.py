@@ -1,5 +1,6 @@
 """Sessions of the virtual device, and what the state that was found leaves of them."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, cast
 
@@ -15,6 +16,7 @@ from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.search import inference
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, resume
 from fieldcal.model.search.selection import Search
@@ -90,6 +92,26 @@ def test_the_earth_s_upright_rate_is_no_g_sensitivity() -> None:
     assert not session.angles
     found = explain(prepare_recording(session.record(32_002_000), session.about))
     assert [one.name for one in found.probable_causes] == ["cross_coupling"]
+
+
+def test_what_another_start_led_to_is_compared_at_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not the likeliest by itself, it may be hardly less likely than what is."""
+    session = plain(np.random.default_rng(4), ("wide",))
+    there: list[Set] = []
+
+    def starts(_: GaussNewton, search: Search, __: Set) -> Iterator[Set]:
+        causes = {c.key: c for c in search.sets.dictionary.causes}
+        drift = causes["bias_drift:acc"]
+        there.append(search.sets.evaluate(((drift, drift.variants[0]),)))
+        yield there[0]
+
+    monkeypatch.setattr(inference, "starting_sets", starts)
+    monkeypatch.setattr(Search, "_with_one_replaced", lambda _, current: current)
+    found = explain(prepare_recording(session.record(4), session.about)).inferred
+    assert not found.best.members
+    assert Sets.key(there[0].members) in found.search.sets.visited
 
 
 @pytest.mark.thorough

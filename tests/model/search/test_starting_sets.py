@@ -111,6 +111,31 @@ def test_positions_that_were_exchanged_are_tried_together(
     assert [set(one.keys) for one in found] == [expected] * tried
 
 
+@pytest.mark.parametrize("gaps", [(), (100.0,), (100.0, 160.0)])
+def test_a_restart_in_the_likeliest_of_the_gaps_is_tried(
+    gaps: tuple[float, ...],
+) -> None:
+    """All biases jump, and the base, which may have been set up anew, does not."""
+    session = Session.of(X, ("bias_step:acc", "bias_step:gyr", "base_step"))
+    d = session.dictionary
+    d.shown = np.ones(d.width, dtype=bool)
+    instants = np.array(sorted({g.shape["at_s"] for g in d.causes[0].variants}))
+    gaps = tuple(float(instants[np.argmin(np.abs(instants - gap))]) for gap in gaps)
+    d.expect_within([(gap - 1e-3, gap + 1e-3) for gap in gaps])
+    off = session.noise(np.random.default_rng(3))
+    if gaps:
+        off[X.t > gaps[-1]] += np.repeat([2e-2, 2e-3], 3)
+    fit, _ = begun([])
+    search = session.search(off)
+    found = list(starting_sets(fit, search, search.sets.evaluate(())))
+    jumps = [one for one in found if "bias_step:acc" in one.keys]
+    assert len(jumps) == bool(gaps)
+    for one in jumps:
+        assert set(one.keys) == {"bias_step:acc", "bias_step:gyr"}
+        assert all(group in cause.expected for cause, group in one.members)
+        assert {g.shape["at_s"] for _, g in one.members} == {gaps[-1]}
+
+
 def evaluated(session: Session, causes: Sequence[Cause]) -> Set:
     """The set of some causes, where nothing was recorded that they explain."""
     sets = session.search(NOTHING).sets

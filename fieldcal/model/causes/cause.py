@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS, Array, Index
+from fieldcal.core.samples import CHANNELS, Array, Index, Mask
+from fieldcal.model import priors
 from fieldcal.model.causes.basis import Course, General
 from fieldcal.physics.effect import Effect
 
@@ -112,7 +113,8 @@ class Group:
     def identity(self) -> tuple[object, ...]:
         """What tells it from other groups of its cause, but for its shape."""
         where = (self.origin, self.position, self.moved_positions)
-        return *where, self.params, self.shape.keys()
+        known = () if self.fixed_size is None else (*self.own_sigma().tolist(),)
+        return *where, self.params, self.shape.keys(), known
 
     def with_same_shape(self, others: Iterable[Group]) -> list[Group]:
         """Groups among `others` with the same shape, origin and position."""
@@ -209,14 +211,15 @@ class Cause:
     def expecting_within(self, spans: Sequence[tuple[float, float]]) -> Cause:
         """The cause with additional variants that begin within some spans, s.
 
-        `spans` are pairs of start and end. The new variants have all axes and the size
-        v = 1, and are `expected`: they have a higher prior probability.
+        `spans` are pairs of start and end. The new variants have all axes and one of
+        `priors.RESTART_SIZES`, and are `expected`: their prior probability is higher.
         """
         if not (spans and self.variants and self.variants[0].begins_at_instant):
             return self
         all_params = max((g.params for g in self.variants), key=len)
         within = [
-            replace(g, fixed_size=1.0)
+            replace(g, typical=v * g.typical, fixed_size=1.0)
+            for v in priors.RESTART_SIZES.tolist()
             for g in self.variants
             if g.params == all_params
             and any(a <= at <= b for at in g.shape.values() for a, b in spans)
@@ -261,6 +264,7 @@ class EqualWidthGroups:
     block : (m,) index of each group's set of columns
     typical : (m, k) typical sizes
     cause, variant : (m,) indices of each group's cause and variant
+    known : (m,) whether a group's size v is known to be 1
 
     """
 
@@ -269,6 +273,7 @@ class EqualWidthGroups:
     typical: Array
     cause: Index
     variant: Index
+    known: Mask
 
     @classmethod
     def of(cls, groups: Sequence[tuple[int, int, Group]]) -> EqualWidthGroups:
@@ -277,4 +282,5 @@ class EqualWidthGroups:
         blocks, block = np.unique(columns, axis=0, return_inverse=True)
         typical = np.array([g.typical[g.leading_columns] for _, _, g in groups])
         cause, variant = np.array([(i, j) for i, j, _ in groups]).T
-        return cls(blocks, block.ravel(), typical, cause, variant)
+        known = np.array([g.fixed_size == 1.0 for _, _, g in groups])
+        return cls(blocks, block.ravel(), typical, cause, variant, known)

@@ -19,7 +19,7 @@ from fieldcal.model.causes.cause import Cause, EqualWidthGroups, Group
 from fieldcal.model.causes.smooth import MAX_COSINES
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, SetKey, Sets, variant_log_priors
-from fieldcal.model.evidence.sizing import LOG_DENSITY, Member, Sizes
+from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member, Sizes
 from fieldcal.model.search.group_gains import GroupGains
 from fieldcal.model.search.set_at_instability import (
     InstabilityIndices,
@@ -245,6 +245,8 @@ class Offers:
         for alike, gain in self._gains.by_width(levels):
             at = alike.cause
             profile = gain + LOG_DENSITY
+            profile[:, alike.known] = -np.inf
+            profile[:, alike.known, UNIT_INDEX] = gain[:, alike.known, UNIT_INDEX]
             size = profile.argmax(axis=2)
             largest = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
             level, number = np.nonzero(

@@ -6,7 +6,7 @@ state by much may look unlikely there, and is tried about its own state as well.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -108,14 +108,23 @@ def _restarts(sets: Sets) -> Iterator[Set]:
     Step by step it is not found where something else, such as wrong angles, explains
     the jump of one triad: beside that, no row needs the jump.
     """
-    jumps: dict[float, tuple[Member, ...]] = {}
+    jumps: dict[float, dict[Cause, list[Group]]] = {}
     for cause in sets.dictionary.causes:
         for group in cause.expected:
             if isinstance(group.effect, BiasChange):
                 (at_s,) = group.shape.values()
-                jumps[at_s] = (*jumps.get(at_s, ()), (cause, group))
+                jumps.setdefault(at_s, {}).setdefault(cause, []).append(group)
     if jumps:
-        yield max(map(sets.evaluate, jumps.values()), key=score_of)
+        yield max((_likeliest_sizes(sets, one) for one in jumps.values()), key=score_of)
+
+
+def _likeliest_sizes(sets: Sets, jumps: Mapping[Cause, Sequence[Group]]) -> Set:
+    """The set of some causes with the likeliest group of each, one after the other."""
+    best = sets.evaluate(())
+    for cause, groups in jumps.items():
+        each = (sets.evaluate((*best.members, (cause, group))) for group in groups)
+        best = max(each, key=score_of)
+    return best
 
 
 def _turns_need_usual_causes(

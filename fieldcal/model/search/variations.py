@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
-from fieldcal.model.evidence.sizing import LOG_DENSITY, Member
+from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
 
 ALTERNATIVE_MARGIN = 6.0
 """Largest predicted distance of alternatives, other parameters or causes, to be
@@ -102,6 +102,9 @@ def _added_log_evidence(
     """Log evidence that each group adds to a set, averaged over its sizes."""
     added: dict[Group, float] = {}
     for group in groups:
-        gains = rest.gain_by_size(group.columns, group.typical)
-        added[group] = float(np.logaddexp.reduce(gains + LOG_DENSITY))
+        gains = rest.gain_by_size(group.columns, group.own_sigma())
+        known = group.fixed_size is not None
+        added[group] = float(
+            gains[UNIT_INDEX] if known else np.logaddexp.reduce(gains + LOG_DENSITY)
+        )
     return added

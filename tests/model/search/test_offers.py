@@ -11,11 +11,12 @@ from small_sessions import Session, ladder
 
 from fieldcal.model import priors
 from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
-from fieldcal.model.evidence.sizing import Member, Sizes
+from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
 from fieldcal.model.search import offers
 from fieldcal.model.search.group_gains import GroupGains
 from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.selection import PREDICTION_SLACK, Search
+from fieldcal.model.search.variations import visit_variations
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "cross_coupling", "settling:acc",
         "time:acc", "time:ax")  # fmt: skip
@@ -150,37 +151,91 @@ def test_what_jumps_on_both_triads_jumps_at_once_or_is_two_events() -> None:
     )
 
 
-def test_where_the_device_may_have_been_off_both_triads_jump_as_is_typical() -> None:
+def test_where_the_device_may_have_been_off_both_triads_jump_by_some_size() -> None:
     at = sorted({g.shape["at_s"] for g in ACC.variants})[7]
     acc, gyr = (c.expecting_within([(at - 1e-3, at + 1e-3)]) for c in (ACC, GYR))
-    ((whole,), (other,)) = acc.expected, gyr.expected
-    assert whole.shape["at_s"] == at and len(whole.params) == 3
-    assert acc.variants == (*ACC.variants, whole) and whole.fixed_size == 1.0
+    whole = acc.variants[len(ACC.variants) :]
+    assert acc.variants == (*ACC.variants, *whole) and {*whole} == acc.expected
+    sizes = [g.own_sigma() / ACC.variants[0].typical[0] for g in whole]
+    np.testing.assert_allclose(sizes, np.outer(priors.RESTART_SIZES, np.ones(3)))
+    assert {g.shape["at_s"] for g in whole} == {at}
+    assert all(len(g.params) == 3 for g in whole)
     alone, usual = variant_log_priors(acc, []), np.log(ACC.chance / len(acc.variants))
-    assert alone[-1] == pytest.approx(np.log(priors.RESTART_CHANCE))
-    np.testing.assert_allclose(alone[:-1], usual)
-    both = variant_log_priors(acc, [(gyr, other)])
-    assert both[-1] == pytest.approx(np.log(priors.BOTH_RESTART_ODDS))
-    there = np.array([g.shape["at_s"] == at for g in ACC.variants])
-    assert np.exp(both[:-1][there]).sum() == pytest.approx(1 / priors.BOTH_RESTART_ODDS)
-    np.testing.assert_allclose(both[:-1][~there], usual)
+    assert np.exp(alone[-3:]) == pytest.approx(np.full(3, priors.RESTART_CHANCE / 3))
+    np.testing.assert_allclose(alone[:-3], usual)
+    for other in gyr.expected:
+        both = variant_log_priors(acc, [(gyr, other)])
+        odds = np.full(3, priors.BOTH_RESTART_ODDS / 3)
+        assert np.exp(both[-3:]) == pytest.approx(odds)
+        there = np.array([g.shape["at_s"] == at for g in ACC.variants])
+        some = np.exp(both[:-3][there]).sum()
+        assert some == pytest.approx(1 / priors.BOTH_RESTART_ODDS)
+        np.testing.assert_allclose(both[:-3][~there], usual)
     assert DRIFT.expecting_within([(0.0, 1e3)]) is DRIFT, "it has no instant"
     assert ACC.expecting_within([]) is ACC
     (knock,) = Session.of(ladder(), ("base_step",)).dictionary.causes
     anew = knock.expecting_within([(at - 1e-3, at + 1e-3)])
-    assert len(anew.expected) == 1, "set up anew meanwhile"
-    assert variant_log_priors(anew, [])[-1] == pytest.approx(
-        np.log(priors.RESTART_CHANCE)
+    assert len(anew.expected) == 3, "set up anew meanwhile"
+    assert np.exp(variant_log_priors(anew, [])[-3:]).sum() == pytest.approx(
+        priors.RESTART_CHANCE
     )
+
+
+@pytest.mark.parametrize("v", priors.RESTART_SIZES)
+def test_a_jump_of_known_size_is_offered_with_the_evidence_of_that_size(
+    v: float,
+) -> None:
+    """Not with that of the size which the rows show, which none of the three is."""
+    session = Session.of(ladder(), ("bias_step:acc", "bias_step:gyr"))
+    d = session.dictionary
+    d.shown = np.ones(d.width, dtype=bool)
+    d.expect_within([(110.0, 120.0)])
+    acc, gyr = d.causes
+    (at_s,) = {g.shape["at_s"] for g in acc.expected}
+    off = session.noise(np.random.default_rng(5))
+    off[d.x.t > at_s, :3] += v * acc.variants[0].typical[0]
+    search = session.search(off)
+    there = search.sets.evaluate(((gyr, gyr.variants[-1]),))
+    each = {g: search.sets.evaluate((*there.members, (acc, g))) for g in acc.expected}
+    most = max(acc.expected, key=lambda g: each[g].score)
+    shares = dict(
+        zip(acc.variants, variant_log_priors(acc, there.members), strict=True)
+    )
+    found = []
+    for table in search.offers.tables(there):
+        for offer in (o for o in table.offers if o.member[0] is acc):
+            group = offer.member[1]
+            gain = table.state.gain_by_size(group.columns, group.own_sigma())
+            added = gain[UNIT_INDEX] + shares[group]
+            assert offer.score == pytest.approx(table.score + added)
+            found.append(group)
+    assert most in found
+    # where its size is little less likely than another, that is visited as well
+    anew = session.search(off).sets
+    best = anew.evaluate(each[most].members)
+    visit_variations(anew, best, best.score)
+    near = [one for one in each.values() if one.score > best.score - 5.5]
+    assert len(near) > 1 or v == 1.0
+    assert all(anew.key(one.members) in anew.visited for one in near)
 
 
 @pytest.mark.parametrize("off", [True, False], ids=["off", "on"])
 def test_what_no_row_shows_of_a_restart_is_offered_all_the_same(off: bool) -> None:
-    """Rows without anything: the likelihood gains nothing, and the odds are 20."""
-    session = Session.of(ladder(), ("bias_step:acc", "bias_step:gyr"))
+    """Of no force afterwards the likelihood gains nothing, and the odds are 20."""
+    whole = Session.of(ladder(), ("bias_step:acc", "bias_step:gyr"))
+    at = whole.dictionary.x.t
+    known = [
+        np.where((p.channel < 3) & (at[p.rows] > 115.0), 1e-9, 1.0)
+        for p in whole.linear
+    ]
+    linear = (
+        replace(p, design=p.design * w[:, None], weight=p.weight * w)
+        for p, w in zip(whole.linear, known, strict=True)
+    )
+    session = replace(whole, linear=tuple(linear))
     d = session.dictionary
     d.shown = np.ones(d.width, dtype=bool)
-    d.expect_within([(100.0, 160.0)] if off else [])
+    d.expect_within([(110.0, 120.0)] if off else [])
     acc, gyr = d.causes
     search = session.search(np.zeros((len(d.x), 6)))
     there = search.sets.evaluate(((gyr, gyr.variants[-1]),))

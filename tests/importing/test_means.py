@@ -15,7 +15,7 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.headings.headings import match_headings
 from fieldcal.importing.tables.means import estimate_mean_uncertainty
-from fieldcal.importing.units.gravity_size import are_means
+from fieldcal.importing.units.gravity_size import are_means, estimate_gravity
 from fieldcal.session.folder import Session
 
 BIAS, RATE = np.array([0.1, -0.05, 0.2]), np.array([0.01, -0.02, 0.005])
@@ -208,6 +208,18 @@ def test_samples_are_no_means() -> None:
     noise = np.random.default_rng(7).normal(0, 0.01, (60, 3)) + [0.1, -0.2, 9.8]
     assert not are_means(noise)
     assert not are_means(slow) and not are_means(slow[:2]) and not are_means(0 * slow)
+
+
+def test_rounding_at_rest_is_no_sphere() -> None:
+    """Each axis changes between two numbers: the corners of a box lie on a sphere."""
+    rng = np.random.default_rng(8)
+    at = np.array([0.002, -0.002, 0.9995])
+    rounded = np.round(at + [4e-4, 5e-4, 5e-4] * rng.integers(0, 2, (400, 3)), 4)
+    for rows in (rounded[:40], rounded):
+        assert not are_means(rows)
+        gravity = estimate_gravity(rows)
+        assert gravity is not None and not gravity.round
+        np.testing.assert_allclose(gravity.size, 1, rtol=1e-3)
 
 
 def test_a_scatter_that_is_only_rounding_is_none() -> None:

@@ -43,6 +43,11 @@ _STEPS = 30
 _WIDE = 0.05
 """Least share of the directions' variance along any axis, for a sphere."""
 
+_BOX = 0.93
+"""Steps of the numbers in the radius of a sphere, at least. A device at rest changes
+between two neighbouring numbers on each axis, and the corners of that box lie on a
+sphere of sqrt(3) / 2 steps whatever it measures; six faces are one step out or more."""
+
 
 _UNEQUAL = 5 / 3
 """Ratio of lengths at rest that no bias makes, which is a quarter of g at most."""
@@ -181,4 +186,19 @@ def _fit_sphere(points: Array, fewest: int = FEWEST_ON_SPHERE) -> tuple[Array, f
     share = np.linalg.eigvalsh(np.cov(away.T))[0] / radius**2
     if np.quantile(departs, 0.9) > _ROUND or share < _WIDE:
         return middle, 0.0
+    if unit * radius < _BOX * _step_of_numbers(points):
+        return middle, 0.0
     return middle + unit * found[:3], unit * radius
+
+
+def _step_of_numbers(points: Array) -> float:
+    """Largest of the steps (m, 3) numbers take on an axis; 0 if they never change.
+
+    >>> _step_of_numbers(np.array([[2.0, 1.0, 0.0], [2.5, 1.0, 0.0], [3.5, 1.0, 0.0]]))
+    0.5
+    """
+    # sums of binary fractions differ in their last digit
+    steps = np.diff(np.sort(points, axis=0), axis=0)
+    steps[steps < 1e-9 * np.abs(points).max()] = np.inf
+    least = steps.min(axis=0)
+    return float(least.max(where=np.isfinite(least), initial=0.0))

@@ -51,6 +51,8 @@ OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "arri
                "recorded")  # fmt: skip
 """Words of times that are another clock's than the device's."""
 
+ACCELERATION = ("acc", "beschl")
+"""Beginnings of words that say acceleration, and no gain of velocity."""
 
 ANGLES = ("roll", "pitch", "yaw", "heading", "azimuth", "euler", "quat", "quaternion")
 """Words of what a filter computes of an attitude."""
@@ -302,5 +304,11 @@ def _match(
     ros = bool(axes) and all(any({*part} <= {*words} for part in ROS) for words in axes)
     half = any(n.says.half for n in chosen)
     usual = HALF_ANGLE if half else "rad/s" if ros else ""
-    free = any(n.says.kind == "a" and n.says.weak and not n.says.gain for n in chosen)
-    return HeadingMatch(tuple(found), units, name, says, usual, reversed_, free)
+    felt = [n for n in chosen if n.says.kind == "a" and not n.says.gain]
+    free = any(n.says.weak for n in felt)
+    # "a" alone may be short for anything
+    words = [w for n in felt for w in words_in_name(columns[n.number].name)]
+    no_gain = free or any(w.startswith(ACCELERATION) for w in words)
+    return HeadingMatch(
+        tuple(found), units, name, says, usual, reversed_, free, no_gain
+    )

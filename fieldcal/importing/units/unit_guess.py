@@ -80,6 +80,7 @@ class UnitGuess:
     name, said, block : of the recording, what is said of it, and its beginning
     columns : in which the rates stand
     alone : whether it is one file: those of several may be in different units
+    began : time of the first row by the clock of the file, 0 if unknown
 
     Attributes
     ----------
@@ -97,6 +98,7 @@ class UnitGuess:
         block: Block,
         columns: NamedColumns,
         alone: bool = True,
+        began: float = 0.0,
     ) -> None:
         self._alone, self._columns = alone, columns
         self.found: dict[str, str] = {}
@@ -105,7 +107,7 @@ class UnitGuess:
         self._name, self.said, self._read = name, said, said
         # of means, the pauses between them say nothing
         if not (said.time_unit or said.rate_hz or are_means(block.acc)):
-            unit, why = assumed_time_unit(name, block.t, block.acc)
+            unit, why = assumed_time_unit(name, block.t, block.acc, began)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
         elif "t" in said.named and not (said.batch or are_means(block.acc)):
@@ -148,7 +150,7 @@ class UnitGuess:
     def _acceleration(self, gravity: GravityReading, acc: Array) -> None:
         fits = fitting_scales(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
         fits = scales_of_decimals(fits, acc)
-        if not fits and self._step and not self.said.free:
+        if not fits and self._step and not self.said.no_gain:
             scales = gain_scales(self._step, "m/s^2", G0)
             fits = fitting_scales(gravity.size, scales, ACC_OUT[not gravity.round])
         shows = f"|a| at rest is {rounded_text(gravity.size, 4)}"

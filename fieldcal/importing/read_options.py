@@ -76,6 +76,7 @@ class ReadOptions:
     tick : step of a clock too coarse for its rows, in its unit; 0 of others
     written_again : whether each of them was written several times
     usual : unit of rates that such names of columns have; "" where they tell none
+    free : whether the names of accelerations are those of ones without gravity
     no_gain : whether names say accelerations, and so no gains of velocity
 
     """
@@ -100,6 +101,7 @@ class ReadOptions:
     tick: float = 0.0
     written_again: bool = False
     usual: str = ""
+    free: bool = False
     no_gain: bool = False
     acc_zero: tuple[float, ...] = ()
 

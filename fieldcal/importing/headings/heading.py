@@ -96,6 +96,7 @@ class HeadingMatch:
             named=frozenset(by_name),
             usual=self.usual,
             reversed=wanted.reversed | self.reversed,
+            free=self.free,
             no_gain=self.no_gain,
         )
 

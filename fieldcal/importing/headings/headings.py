@@ -122,6 +122,16 @@ def match_beside(columns: Sequence[Column], skip: str = "") -> HeadingMatch | No
     return _match(columns, chosen, skip, "0", says) if chosen else None
 
 
+def are_free(columns: Sequence[Column]) -> bool:
+    """Whether columns are called as accelerations without gravity are.
+
+    >>> are_free([Column("", "Linear Acceleration x"), Column("", "ay")])
+    True
+    """
+    said = [heading_meaning(column.name, column.unit) for column in columns]
+    return any(s and s.kind == "a" and s.weak and not s.gain for s in said)
+
+
 def _left_out(names: Sequence[str]) -> str:
     """Say that rates are taken of no IMU."""
     return f"{', '.join(names)}: go with no accelerometers by their names; left out"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.core.samples import ACC, CHANNELS, Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.headings import headings
 from fieldcal.importing.headings.column_units import (
@@ -228,6 +228,9 @@ class ColumnRecording(Recording):
         if way is None or len(way.columns) != k:
             return wanted
         at = {channel: i for i, channel in told.channels.items()}
+        # names that do not say all may say that gravity is lacking
+        free = headings.are_free([way.columns[at[c]] for c in CHANNELS[ACC] if c in at])
+        wanted = replace(wanted, free=free, no_gain=wanted.no_gain or free)
         return self._with_units_over(wanted, way, at)
 
     def _say_unnamed(self, named: Sequence[HeadingMatch], way: Heading | None) -> None:

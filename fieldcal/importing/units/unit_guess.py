@@ -174,6 +174,13 @@ class UnitGuess:
                 (unit_options("acc", fits, "g", 1) if fits else PLAIN_UNITS)
                 + zero_options(self.said, gravity),
             )
+        if self.said.free and fits and fits[0].unit != "m/s^2" and not gravity.round:
+            self._ask(
+                f"{shows}, and the names of its columns are those of accelerations"
+                f" without gravity, by which nothing can be calibrated ({LOG_GRAVITY});"
+                " if it is in them, say the unit",
+                unit_options("acc", fits, "g", gravity.size),
+            )
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is gravity in"

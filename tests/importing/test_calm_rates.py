@@ -10,7 +10,12 @@ from joined import read_files
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing.units.calm_rates import DEG, RAD, guess_unit_of_calm_rates
+from fieldcal.importing.units.calm_rates import (
+    DEG,
+    RAD,
+    guess_unit_of_calm_rates,
+    unit_of_steps,
+)
 from fieldcal.importing.units.rate_size import TurnComparison
 from fieldcal.session.folder import Session
 
@@ -196,3 +201,12 @@ def test_the_steps_of_a_full_scale_tell_the_unit_of_a_calm_device(
     found, _ = read_files([path])
     size = np.deg2rad(counts / lsb)
     np.testing.assert_allclose(found.gyr, size, rtol=1e-3, atol=2e-7)
+
+
+@pytest.mark.parametrize("digits", [5, 4])
+def test_steps_are_counted_to_the_fastest_rates(digits: int) -> None:
+    """Rounded to some digits, one step is not known well enough to count thousands."""
+    counts = np.round(np.random.default_rng(2).normal(0, 900, (400, 3)))
+    found = unit_of_steps(np.round(counts / 16.384, digits))
+    assert found is not None and found.scale is not None
+    assert found.scale.unit == "deg/s"

@@ -43,6 +43,9 @@ SAME_STEP, OFF_STEP = 1.02, 0.1
 """Ratio within which steps are the same, and part of a step by which a number that was
 rounded to some decimals is off one."""
 
+FARTHER = (8, 64, 512, 4096, 65536)
+"""Steps to the values by which a step is found ever more exactly."""
+
 DECIMAL = (1.0, 2.0, 5.0)
 """First digit of steps that are those of decimals."""
 
@@ -144,7 +147,14 @@ def _step(axis: Array) -> float:
     if len(apart) < FEWEST_STEPS:
         return 0.0
     step = float(np.median(apart[apart < SAME_STEP * apart.min()]))
-    many = (values - values[0]) / step
+    from_middle = values - values[len(values) // 2]
+    # decimals that round a step leave it too rough to count to the farthest values
+    for far in FARTHER:
+        near = from_middle[np.abs(from_middle) <= far * step]
+        counts = np.round(near / step)
+        if counts.any():
+            step = float(counts @ near / (counts @ counts))
+    many = from_middle / step
     if np.abs(many - np.round(many)).max() > OFF_STEP:
         return 0.0
     digits = float(f"{step:.1e}".partition("e")[0])

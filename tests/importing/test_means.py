@@ -210,6 +210,22 @@ def test_samples_are_no_means() -> None:
     assert not are_means(slow) and not are_means(slow[:2]) and not are_means(0 * slow)
 
 
+def test_what_a_hand_shakes_is_no_table_of_means(tmp_path: Path) -> None:
+    """Ten rows a second, each turned far from the one before."""
+    shaken = means(9, 36)
+    shaken[:, 3:] = np.random.default_rng(9).normal(0, 3, (36, 3))
+    for size, unit in ((1.0, "s"), (1e3, "ms")):
+        t = size * 0.1 * np.arange(36)
+        assert are_means(shaken[:, :3]) and not are_means(shaken[:, :3], t / size)
+        path = write(
+            tmp_path, np.column_stack([t, shaken]), heading=f"t ({unit}),{SIX}"
+        )
+        out = tmp_path / unit
+        assert main(["import", str(path), "-o", str(out), "--gyr-unit", "rad/s"]) == 0
+        made = Session.open(out)
+        assert not made.about.positions and "means" not in made.about.raw
+
+
 def test_rounding_at_rest_is_no_sphere() -> None:
     """Each axis changes between two numbers: the corners of a box lie on a sphere."""
     rng = np.random.default_rng(8)

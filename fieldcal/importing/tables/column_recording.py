@@ -131,7 +131,8 @@ class ColumnRecording(Recording):
         at = column_numbers(self, wanted)
         if not {"ax", "ay", "az"} <= set(at) or not len(table):
             return None
-        if not are_means(table[:, [at["a" + axis] for axis in "xyz"]]):
+        t = table[:, at["t"]] * wanted.time_scale if "t" in at else None
+        if not are_means(table[:, [at["a" + axis] for axis in "xyz"]], t):
             return None
         fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
         where = scatter_columns(next(fits, Heading([])).columns)

@@ -25,6 +25,10 @@ FEWEST_FACES, FEWEST_ON_SPHERE = 6, 9
 MIN_ROW_ANGLE_RAD = np.deg2rad(10.0)
 """Angle between successive rows that samples do not have, rad."""
 
+BETWEEN_POSITIONS_S = 1.0
+"""Least time from one position to the next, s: a hand that shakes a device turns it by
+as much between two samples."""
+
 _ALIKE = 0.15
 """Part by which lengths of means in a table of them differ."""
 
@@ -75,11 +79,14 @@ def _readings(acc: Array) -> Array:
     return rows
 
 
-def are_means(acc: Array) -> bool:
+def are_means(acc: Array, t: Array | None = None) -> bool:
     """Whether rows (n, 3) are means of positions: successive directions differ.
 
     Samples that follow each other point nearly the same way; means of positions do not.
+    Times (n,), s, are those of rows; a unit that nobody says is taken for s.
     """
+    if t is not None and _follow_at_once(t):
+        return False
     acc = _readings(acc)
     if not FEWEST_MEANS <= len(acc) <= MOST_MEANS:
         return False
@@ -97,10 +104,21 @@ def are_means(acc: Array) -> bool:
     return bool(np.median(turned) > MIN_ROW_ANGLE_RAD)
 
 
-def estimate_gravity(acc: Array) -> GravityReading | None:
-    """Size of gravity in numbers (n, 3) of a file, by (1); None of too few."""
+def _follow_at_once(t: Array) -> bool:
+    """Whether rows of times (n,), s, come sooner than anybody takes a position."""
+    steps = np.diff(t[np.isfinite(t)])
+    steps = steps[steps > 0]
+    return bool(len(steps) and np.median(steps) < BETWEEN_POSITIONS_S)
+
+
+def estimate_gravity(acc: Array, t: Array | None = None) -> GravityReading | None:
+    """Size of gravity in numbers (n, 3) of a file, by (1); None of too few.
+
+    `t` (n,) are the times of the rows, as in `are_means`.
+    """
+    means = are_means(acc, t)
     acc = _readings(acc)
-    if are_means(acc):
+    if means:
         return _gravity_of(acc)
     if len(acc) < MIN_ROWS_ALONE:
         return None

@@ -105,18 +105,21 @@ class UnitGuess:
         self.acc_bias: list[float] | None = None
         self.doubts: list[str] = []
         self._name, self.said, self._read = name, said, said
+        # a rate is that of samples, or of means that are counted
+        of_rows = None if said.rate_hz else block.t
+        means = are_means(block.acc, of_rows)
         # of means, the pauses between them say nothing
-        if not (said.time_unit or said.rate_hz or are_means(block.acc)):
+        if not (said.time_unit or said.rate_hz or means):
             unit, why = assumed_time_unit(name, block.t, block.acc, began)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
-        elif "t" in said.named and not (said.batch or are_means(block.acc)):
+        elif "t" in said.named and not (said.batch or means):
             check_stated_times(name, said.time_unit, block.t)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
         self._zero = said.acc_scale * said.zero
         written, block = block.acc, replace(block, acc=block.acc - self._zero)
-        gravity = estimate_gravity(block.acc)
+        gravity = estimate_gravity(block.acc, of_rows)
         self._step = usual_step(t) if said.rate_hz is None else 1 / said.rate_hz
         if gravity and not said.acc_unit and said.acc_lsb == 1:
             self._acceleration(gravity, written)

@@ -73,7 +73,11 @@ class CalmRateUnit(NamedTuple):
 
 
 def guess_unit_of_calm_rates(
-    gyr: Array, turns: TurnComparison | None, step: float | None, usual: str
+    gyr: Array,
+    turns: TurnComparison | None,
+    step: float | None,
+    usual: str,
+    counts: bool = False,
 ) -> CalmRateUnit:
     """Guess the unit of rates in a recording without turns.
 
@@ -84,6 +88,8 @@ def guess_unit_of_calm_rates(
     step : s, over which rates are what was gained: accelerations are the gain of
         velocity, or names say half the angle; None where not
     usual : unit that rates of such names are in; "" where names tell none
+    counts : whether accelerations are: who writes one sensor's registers as they are,
+        writes the other's so too
 
     """
     plain = [s for s in (RAD, DEG) if not usual or s.unit == usual] + [RAD, DEG]
@@ -111,7 +117,7 @@ def guess_unit_of_calm_rates(
         return CalmRateUnit(RAD, "it is the usual one, and no turn tells")
     shown = f"{fast:.4g}" if fast > MAX_REST_RATE else f"a scatter of {noise:.2g}"
     asks = f"nothing says the unit of its rates, and {shown} rad/s is no rest"
-    return CalmRateUnit(None, "", asks, tuple(_answers(gyr, turns, whole)))
+    return CalmRateUnit(None, "", asks, tuple(_answers(gyr, turns, whole, counts)))
 
 
 def unit_of_steps(gyr: Array) -> CalmRateUnit | None:
@@ -168,11 +174,13 @@ def _in_degrees(turns: TurnComparison) -> bool:
     return turns.said >= least and turns.allow(DEG.size, AS_SHOWN)
 
 
-def _answers(gyr: Array, turns: TurnComparison | None, whole: bool) -> list[str]:
-    """Options: those that can be; of whole numbers counts as well."""
+def _answers(
+    gyr: Array, turns: TurnComparison | None, whole: bool, counts: bool
+) -> list[str]:
+    """Options: those that can be; of whole numbers counts as well, or alone."""
     scales = [DEG, *(USUAL_COUNTS if whole else [RAD])]
     fits = [s for s in scales if turns is None or turns.allow(s.size)]
-    if whole and np.abs(gyr).max() > FASTEST:
+    if whole and (counts or np.abs(gyr).max() > FASTEST):
         fits = [s for s in fits if s != DEG]
     said = unit_options("gyr", fits or scales, "deg/s", DEG.size)
     return [f"{a}, if it is so" if a == "--gyr-unit rad/s" else a for a in said]

@@ -268,7 +268,8 @@ class UnitGuess:
         """Rates of which no turn tells."""
         turns = gravity and compare_turns(block.t, block.acc, block.gyr, gravity)
         gained = self._step if self._gained or self._halved else None
-        found = guess_unit_of_calm_rates(gyr, turns, gained, self.said.usual)
+        counts = self.said.acc_lsb != 1 and gained is None
+        found = guess_unit_of_calm_rates(gyr, turns, gained, self.said.usual, counts)
         if found.scale is None:
             self._ask(found.asks, [*found.answers])
         else:

@@ -30,6 +30,7 @@ from fieldcal.importing.units.scales import (
     GYR_OUT,
     MIN_ROWS_ALONE,
     Scale,
+    binary_counts,
     fitting_scales,
     gain_scales,
     half_angle_scales,
@@ -153,12 +154,15 @@ class UnitGuess:
     def _acceleration(self, gravity: GravityReading, acc: Array) -> None:
         fits = fitting_scales(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
         fits = scales_of_decimals(fits, acc)
-        if not fits and self._step and not self.said.no_gain:
-            scales = gain_scales(self._step, "m/s^2", G0)
-            fits = fitting_scales(gravity.size, scales, ACC_OUT[not gravity.round])
         shows = f"|a| at rest is {rounded_text(gravity.size, 4)}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
+        if not fits and gravity.size >= NO_UNIT and (lsb := binary_counts(acc)):
+            fits = [scale for scale in ACC_SCALES if str(scale) == "g"]
+            shows += f", and its steps are those of {lsb} counts in a g"
+        if not fits and self._step and not self.said.no_gain:
+            scales = gain_scales(self._step, "m/s^2", G0)
+            fits = fitting_scales(gravity.size, scales, ACC_OUT[not gravity.round])
         if not fits and gravity.size < NO_UNIT:
             raise InputError(
                 f"{self._name}: {shows}, less than gravity reads in any unit: it seems"

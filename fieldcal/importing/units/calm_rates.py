@@ -15,8 +15,10 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.units.rate_size import STIRS, TIMES, TurnComparison
 from fieldcal.importing.units.scales import (
     GYR_SCALES,
+    RATE_SCALES,
     USUAL_COUNTS,
     Scale,
+    binary_counts,
     gain_scales,
     half_angle_scales,
 )
@@ -132,7 +134,12 @@ def unit_of_steps(gyr: Array) -> CalmRateUnit | None:
     'rad/s'
     >>> unit_of_steps(0.01 * counts) is None
     True
+    >>> unit_of_steps(np.arange(-45.0, 45.0).reshape(-1, 3) / 128).scale.unit
+    'deg/s'
     """
+    if lsb := binary_counts(gyr, RATE_SCALES):
+        why = f"its steps of {1 / lsb:.4g} are those of {lsb} counts in a deg/s"
+        return CalmRateUnit(DEG, f"{why}, and no turn tells")
     steps = [step for axis in gyr.T if (step := _step(axis))]
     if not steps or max(steps) > SAME_STEP * min(steps):
         return None

@@ -160,7 +160,11 @@ DIFFERENT = 8
 """Different numbers that are whole counts of a power of two by no chance."""
 
 
-def binary_counts(acc: Array) -> int:
+RATE_SCALES = range(4, 9)
+"""The same of the counts in one deg/s that some gyroscopes have."""
+
+
+def binary_counts(numbers: Array, exponents: range = FULL_SCALES) -> int:
     """Counts in one of the unit of numbers (n, 3), if a power of two; else 0.
 
     A program that divides the registers by the counts in one g, which are a power of
@@ -170,13 +174,13 @@ def binary_counts(acc: Array) -> int:
     >>> [binary_counts(counts / n) for n in (4096, 4096 / 9.80665, 4000)]
     [4096, 0, 0]
     """
-    numbers = np.unique(acc[np.isfinite(acc)])
-    if len(numbers) < DIFFERENT:
+    shown = np.unique(numbers[np.isfinite(numbers)])
+    if len(shown) < DIFFERENT:
         return 0
-    for exponent in FULL_SCALES:
-        counts = numbers * 2**exponent
+    for exponent in exponents:
+        counts = shown * 2**exponent
         if np.abs(counts - np.round(counts)).max() < 1e-6:
-            return 0 if exponent == FULL_SCALES[0] else 2**exponent
+            return 0 if exponent == exponents[0] else 2**exponent
     return 0
 
 

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joined import read_files
 from laid_about import G, write
 
 from fieldcal.cli import main
+from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Column
@@ -224,6 +226,16 @@ def test_what_a_hand_shakes_is_no_table_of_means(tmp_path: Path) -> None:
         assert main(["import", str(path), "-o", str(out), "--gyr-unit", "rad/s"]) == 0
         made = Session.open(out)
         assert not made.about.positions and "means" not in made.about.raw
+
+
+def test_rates_tell_what_a_hand_shakes_where_there_are_no_times(
+    tmp_path: Path,
+) -> None:
+    shaken = means(9, 36)
+    shaken[:, 3:] = np.random.default_rng(9).normal(0, 80, (36, 3))
+    for heading in (SIX, "ax,ay,az,gx (deg/s),gy (deg/s),gz (deg/s)"):
+        with pytest.raises(InputError, match="no column is t, the time"):
+            read_files([write(tmp_path, shaken, heading=heading)])
 
 
 def test_rounding_at_rest_is_no_sphere() -> None:

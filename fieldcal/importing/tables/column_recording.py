@@ -31,7 +31,7 @@ from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.axis_triples import unnamed_axes
 from fieldcal.importing.tables.column_choices import ask_of_choices, columns_option
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate
-from fieldcal.importing.tables.column_source import column_numbers
+from fieldcal.importing.tables.column_source import column_numbers, rates_in_degrees
 from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
@@ -132,7 +132,9 @@ class ColumnRecording(Recording):
         if not {"ax", "ay", "az"} <= set(at) or not len(table):
             return None
         t = table[:, at["t"]] * wanted.time_scale if "t" in at else None
-        if not are_means(table[:, [at["a" + axis] for axis in "xyz"]], t):
+        three = [[at[k + x] for x in "xyz" if k + x in at] for k in "ag"]
+        gyr = rates_in_degrees(table, three[1], wanted)
+        if not are_means(table[:, three[0]], t, gyr):
             return None
         fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
         where = scatter_columns(next(fits, Heading([])).columns)

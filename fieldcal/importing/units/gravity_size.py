@@ -25,6 +25,10 @@ FEWEST_FACES, FEWEST_ON_SPHERE = 6, 9
 MIN_ROW_ANGLE_RAD = np.deg2rad(10.0)
 """Angle between successive rows that samples do not have, rad."""
 
+MOST_AT_REST, FINEST_COUNTS = 5.0, 131.072
+"""Most by which rates at rest differ from position to position, deg/s: rad/s, by less;
+and the most counts that are usual in a deg/s."""
+
 BETWEEN_POSITIONS_S = 1.0
 """Least time from one position to the next, s: a hand that shakes a device turns it by
 as much between two samples."""
@@ -79,13 +83,16 @@ def _readings(acc: Array) -> Array:
     return rows
 
 
-def are_means(acc: Array, t: Array | None = None) -> bool:
+def are_means(acc: Array, t: Array | None = None, gyr: Array | None = None) -> bool:
     """Whether rows (n, 3) are means of positions: successive directions differ.
 
     Samples that follow each other point nearly the same way; means of positions do not.
-    Times (n,), s, are those of rows; a unit that nobody says is taken for s.
+    Times (n,), s, are those of rows; a unit that nobody says is taken for s. Rates
+    (n, 3), deg/s or in the numbers of the file, are those of a device at rest then.
     """
     if t is not None and _follow_at_once(t):
+        return False
+    if gyr is not None and _are_of_turns(gyr):
         return False
     acc = _readings(acc)
     if not FEWEST_MEANS <= len(acc) <= MOST_MEANS:
@@ -102,6 +109,16 @@ def are_means(acc: Array, t: Array | None = None) -> bool:
     up = acc / length[:, None]
     turned = np.arccos(np.clip((up[1:] * up[:-1]).sum(axis=1), -1, 1))
     return bool(np.median(turned) > MIN_ROW_ANGLE_RAD)
+
+
+def _are_of_turns(gyr: Array) -> bool:
+    """Whether rates (n, 3), counts if they are whole, differ as at no rests."""
+    known = gyr[np.isfinite(gyr).all(axis=1)]
+    if not len(known):
+        return False
+    whole = bool((known == np.round(known)).all())
+    most = MOST_AT_REST * (FINEST_COUNTS if whole else 1.0)
+    return bool(np.ptp(known, axis=0).max() > most)
 
 
 def _follow_at_once(t: Array) -> bool:

@@ -17,8 +17,8 @@ from fieldcal.core.samples import Array
 WIDER = 1.9
 """Least distance of neighbouring values, in u, that is a matter of another grid."""
 
-TRIED_AT_ONCE, MOST_TRIED = 1 << 10, 1 << 16
-"""Steps that are tried together, and at all."""
+TRIED_AT_ONCE, MOST_TRIED, PROBES = 1 << 14, 1 << 20, 24
+"""Steps that are tried together, and at all; and values by which they are."""
 
 CHANCE = 1e-9
 """Probability of the values below which a step is no matter of chance."""
@@ -55,9 +55,10 @@ def grid_below_digits(shown: Array, digits: float) -> float:
     chance = len(shown) * np.log(1.5 * digits / low) + np.log(many)
     if many > MOST_TRIED or chance > np.log(CHANCE):
         return 0.0
+    few = shown[np.unique(np.linspace(0, len(shown) - 1, PROBES).astype(np.intp))]
     for first in range(0, many, TRIED_AT_ONCE):
         tried = low + change * np.arange(first, min(first + TRIED_AT_ONCE, many))
-        place = shown / tried[:, None]
+        place = few / tried[:, None]
         off = np.abs(place - np.round(place)).max(axis=1) * tried
         for step in tried[off < 0.8 * digits]:
             k = np.round(shown / step)

@@ -46,3 +46,11 @@ def test_what_lies_on_no_grid_of_a_device_has_none(digits: float) -> None:
         shown = np.unique(np.round(rng.normal(0, 0.7, many) / digits)) * digits
         assert not grid_below_digits(shown, digits)
     assert not grid_below_digits(np.arange(100) * digits, digits)
+
+
+@pytest.mark.parametrize("digits", [1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("many", [300, 20000])
+def test_a_step_is_found_among_few_values_and_many(digits: float, many: int) -> None:
+    counts = np.round(np.random.default_rng(many).normal(0, 1500, many))
+    shown = np.unique(np.round(STEP * counts / digits) * digits)
+    assert abs(grid_below_digits(shown, digits) / STEP - 1) < 1e-5

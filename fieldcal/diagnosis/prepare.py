@@ -187,19 +187,25 @@ def _without_constant_temperature(rows: Rows, warmth: Thermometer) -> Rows:
 
 def _refuse_empty(block: Block, about: Description) -> None:
     windows = window_bounds(block, about)
-    if not (windows[:, 1] - windows[:, 0] >= MIN_WINDOW_SAMPLES).any():
+    many = windows[:, 1] - windows[:, 0]
+    if not (many >= MIN_WINDOW_SAMPLES).any():
         if not about.positions:
             raise InputError(
                 f"session.toml has no [[position]], and {len(block)} samples are less"
                 f" than the {MIN_WINDOW_SAMPLES} of the shortest window: record longer,"
                 " or at a higher rate"
             )
-        held = len(about.positions)
+        held, most = len(about.positions), int(many.max(initial=0))
+        if most:
+            raise InputError(
+                f"the longest window in session.toml holds {most} samples, and"
+                f" {MIN_WINDOW_SAMPLES} are needed: rest longer, or record at a higher"
+                " rate"
+            )
         raise InputError(
-            f"none of the {held} windows in session.toml holds"
-            f" {MIN_WINDOW_SAMPLES} samples; the samples run from {block.t[0]:g} to"
-            f" {block.t[-1]:g} s of device time:"
-            " check start_s and end_s"
+            f"none of the {held} windows in session.toml holds a sample; these run"
+            f" from {block.t[0]:g} to {block.t[-1]:g} s of device time: check start_s"
+            " and end_s"
         )
     if not (np.isfinite(block.acc).any() or np.isfinite(block.gyr).any()):
         raise InputError("the samples hold no output of any sensor; record them again")

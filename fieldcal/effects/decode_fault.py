@@ -8,8 +8,9 @@ Of a 16-bit count, high and low byte hi, lo:
 
 Each can be undone count by count; what was broken gets smoother by it, what was whole
 rougher. Single samples that jump away and back by more than the device can move are
-none of these; each is replaced by the mean of those beside it. Source: model of this
-project; the usual slips in reading a register pair.
+none of these; each is replaced by the mean of those beside it. Those that are off by
+one size are put back by it (`torn_values`). Source: model of this project; the usual
+slips in reading a register pair.
 
 >>> import numpy as np
 >>> course = np.arange(1000, 3000, 7)
@@ -28,6 +29,7 @@ from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
+from fieldcal.physics.torn_values import torn_values
 from fieldcal.windows.spikes import WILD, without_spikes
 
 Counts = NDArray[np.int64]
@@ -132,7 +134,9 @@ class DecodeFault(Chain):
     decided_by = "the byte order and width in the device's manual"
     cure = (
         "Correct byte order, width or sign in the decoder; single wild values come of"
-        " damaged frames: check the cable, its speed, and that checksums are looked at."
+        " damaged frames: check the cable, its speed, and that checksums are looked at;"
+        " values off by one size, of a register that changes as it is read: switch on"
+        " its block data update, or wait until data is ready."
     )
     source = "model of this project"
 
@@ -146,9 +150,36 @@ class DecodeFault(Chain):
                 # one driver reads all three; one turn wraps an axis there and back
                 again = (slips[c] or _fault(recording, c, WRAPPED_ONCE) for c in triad)
                 slips[first : first + 3] = again
-        found = (slip or _restore_outliers(recording, c, wild[:, c])
-                 for c, slip in enumerate(slips))  # fmt: skip
+        found = [slip or _restore_outliers(recording, c, wild[:, c])
+                 for c, slip in enumerate(slips)]  # fmt: skip
+        for first in (0, 3):
+            if not any(found[first : first + 3]):
+                found[first : first + 3] = _put_back(recording, first)
         return [fault for fault in found if fault is not None]
+
+
+def _put_back(recording: CheckedSamples, first: int) -> list[Fault | None]:
+    """Faults of a sensor's three channels with samples that are off by one size."""
+    of = slice(first, first + 3)
+    six, t = recording.block.six, recording.block.t
+    torn = torn_values(six[:, of], recording.still, recording.steps[of])
+    out: list[Fault | None] = [None, None, None]
+    if torn is None:
+        return out
+    for axis in np.flatnonzero(torn.off.any(axis=0)):
+        c = first + int(axis)
+        rows, mended = np.flatnonzero(torn.off[:, axis]), six.copy()
+        mended[:, c] -= torn.off[:, axis]
+        out[axis] = Fault(
+            channel=CHANNELS[c],
+            values={"channel": CHANNELS[c], "kind": "one_size"},
+            sigmas={},
+            from_s=float(t[rows[0]]),
+            to_s=float(t[rows[-1]]),
+            size=torn.size,
+            mended=mended,
+        )
+    return out
 
 
 def _outlier_samples(recording: CheckedSamples) -> NDArray[np.bool_]:

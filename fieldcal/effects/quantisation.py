@@ -18,13 +18,18 @@ array([0.0539])
 
 from __future__ import annotations
 
-from fieldcal.core.samples import CHANNELS
+import numpy as np
+
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
-from fieldcal.physics.recording import CheckedSamples, Fault
+from fieldcal.physics.recording import MIN_GRID_VALUES, CheckedSamples, Fault
 from fieldcal.windows import rounding
 
 MATTERS = 0.5
 """Noise in steps from which rounding is no matter: LSB > 2 sigma is far beyond it."""
+
+WELL_KNOWN = 1e-3
+"""Least standard deviation of a step, of its size."""
 
 
 class Quantisation(Chain):
@@ -49,11 +54,13 @@ class Quantisation(Chain):
             ]
             if coarse:
                 lsb, worst, first, last = max(coarse)
+                block = recording.block[first:last]
+                shown = block.acc if part == "acc" else block.gyr
                 out.append(
                     Fault(
                         channel=CHANNELS[worst],
                         values={part: lsb},
-                        sigmas={part: 1e-3 * lsb},
+                        sigmas={part: step_deviation(shown, worst % 3, lsb)},
                         from_s=float(t[first]),
                         to_s=float(t[last - 1]),
                         size=lsb,
@@ -66,3 +73,25 @@ class Quantisation(Chain):
         finest = recording.grids.steps[:, c].min()
         own = rounding.noise_before_rounding(recording.noise[c], finest)
         return bool(lsb > 2 * MATTERS * own)
+
+
+def step_deviation(triad: Array, axis: int, lsb: float) -> float:
+    """Standard deviation of the step of an axis, by how its values depart from it.
+
+    A log with few digits rounds what lay on the grid of the device once more. An axis
+    that shows few values has the step of the others, so theirs count too.
+
+    >>> values = np.array([[0.0020, 0.9995, 0.0], [0.0024, 1.0, 0.0]])
+    >>> round(step_deviation(values, 0, 4e-4), 6)
+    7.1e-05
+    """
+    shown = [np.unique(one[np.isfinite(one)]) for one in triad.T]
+    few = len(shown[axis]) < MIN_GRID_VALUES
+    alike = [v for v in shown if len(v) < MIN_GRID_VALUES] if few else [shown[axis]]
+    gaps = np.concatenate([np.diff(values) for values in alike])
+    steps = np.round(gaps / lsb)
+    if not steps.any():
+        return WELL_KNOWN * lsb
+    departs = np.sqrt(np.mean((gaps - steps * lsb)[steps > 0] ** 2))
+    span = max(steps.sum() / len(alike), 1.0)
+    return max(WELL_KNOWN * lsb, float(departs / span))

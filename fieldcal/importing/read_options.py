@@ -77,6 +77,7 @@ class ReadOptions:
     written_again : whether each of them was written several times
     usual : unit of rates that such names of columns have; "" where they tell none
     free : whether the names of accelerations are those of ones without gravity
+    no_gain : whether names say accelerations, and so no gains of velocity
 
     """
 
@@ -101,6 +102,7 @@ class ReadOptions:
     written_again: bool = False
     usual: str = ""
     free: bool = False
+    no_gain: bool = False
     acc_zero: tuple[float, ...] = ()
 
     @property

@@ -25,6 +25,7 @@ from fieldcal.physics.recording import (
     shown_values,
     step_between,
 )
+from fieldcal.physics.rounded_grid import ROUNDED, grid_below_digits
 from fieldcal.windows import rounding
 from fieldcal.windows.noise import short_lag_noise
 
@@ -61,7 +62,7 @@ Stretch = tuple[int, int, float]
 @once_per_block
 def grids_by_stretch(block: Block) -> Grids:
     """Grids of the outputs of a recording, a stretch for each."""
-    whole = grids_of(block)
+    whole = _without_digits(block, grids_of(block))
     parts = [
         _with_those_of_other_axes(triad, steps)
         for triad, steps in ((block.acc, whole[:3]), (block.gyr, whole[3:]))
@@ -81,6 +82,22 @@ def grids_by_stretch(block: Block) -> Grids:
         for a, b, step in others:
             steps[(starts >= a) & (starts < b), c] = step
     return Grids(starts, steps)
+
+
+def _without_digits(block: Block, steps: Array) -> Array:
+    """Steps of the device (6,), where those of the digits of a log hide them.
+
+    An axis that shows too few values has the step of its sensor's other axes.
+    """
+    out = steps.copy()
+    for first, triad in ((0, block.acc), (3, block.gyr)):
+        shown = [shown_values(axis) for axis in triad.T]
+        own = np.array([grid_below_digits(v, q) for v, q in
+                        zip(shown, steps[first : first + 3], strict=True)])  # fmt: skip
+        for c, values in enumerate(shown):
+            fits = [q for q in own if q and _is_rounded(values, q, steps[first + c])]
+            out[first + c] = own[c] or min(fits, default=steps[first + c])
+    return out
 
 
 def _step_beside(values: Array, stretches: Sequence[Stretch]) -> float:
@@ -118,6 +135,12 @@ def _is_on_grid(values: Array, step: float) -> bool:
     shown = shown_values(values)
     away = (shown - shown[:1]) / step
     return bool((np.abs(away - np.round(away)) < ON_GRID).all())
+
+
+def _is_rounded(values: Array, step: float, digits: float) -> bool:
+    """Whether values are multiples of a step, rounded to some digits."""
+    off = np.abs(values - step * np.round(values / step))
+    return bool((off <= ROUNDED * digits).all())
 
 
 def _coarser_stretches(values: Array, step: float) -> list[Stretch]:

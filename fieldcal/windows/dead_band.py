@@ -2,7 +2,9 @@
 
 An output has a dead band d, m/s^2 or rad/s, if it is often zero, has no other value
 below d in size, and has values just above d. The last condition distinguishes a dead
-band from rounding to a grid of step d, whose next value is 2 d. A mean of less than 2 d
+band from rounding to a grid of step d, whose next value is 2 d. The axes of a sensor go
+through the same program: those that are often zero show their band together, also where
+each turns too quickly to have values just above d. A mean of less than 2 d
 has a standard error of at most d / sqrt(3), whatever part of its samples was set to
 zero.
 """
@@ -37,13 +39,21 @@ def dead_bands(block: Block) -> Array:
     >>> dead_bands(block).round(1).tolist()
     [0.0, 0.0, 0.0, 0.2, 0.2, 0.2]
     """
-    bands = np.array([_nearest_value(v) for v in (*block.acc.T, *block.gyr.T)])
+    bands = np.concatenate([_bands_of_sensor(s) for s in (block.acc, block.gyr)])
     if bands.any():
         felt = (block.acc != 0).any(axis=1)
         received = felt | (block.gyr != 0).any(axis=1)
         zeros = [(t == 0).sum(axis=0) for t in (block.acc[felt], block.gyr[received])]
         bands[np.concatenate(zeros) < MIN_SAMPLES] = 0.0
     return bands
+
+
+def _bands_of_sensor(triad: Array) -> Array:
+    """Size of the value nearest to zero of each axis that may have a band, (3,)."""
+    bands = np.array([_nearest_value(axis) for axis in triad.T])
+    often = (triad == 0).sum(axis=0) >= MIN_SAMPLES
+    together = _nearest_value(triad[:, often].ravel()) if often.any() else 0.0
+    return np.where(often & (bands == 0), together, bands)
 
 
 def _nearest_value(values: Array) -> float:

@@ -4,7 +4,8 @@
 
 x_i are the rows of an accelerometer, and s is the noise of a row, m/s^2. A single
 outlier does not change a median. At a jump between two rows (1) is true at five rows,
-or at six with an outlier next to it; at a recorded turn it is true at more rows. In a
+or at six with an outlier next to it, and the jump is into the row of them that differs
+most from the row before; at a recorded turn (1) is true at more rows. In a
 rest the first and the last median differ by less than a jump, and the rows have the
 same scatter as in other rests; neither holds for a moving device. Such a recording
 results if the operator presses a key at each position, and a hundred rows are taken at
@@ -46,6 +47,7 @@ class JumpRows(NamedTuple):
     before, after : medians before and after it, (k, 3) m/s^2
     steps : sum of the successive differences of all rows up to it, each limited to a
         jump, (k,) m/s^2
+    last_step : by how much it differs from the row before, (k,) m/s^2
 
     """
 
@@ -54,6 +56,14 @@ class JumpRows(NamedTuple):
     before: Array
     after: Array
     steps: Array
+    last_step: Array
+
+    def some(self, rows: NDArray[np.intp]) -> JumpRows:
+        """Those at some indices."""
+        return JumpRows(
+            self.row[rows], self.time[rows], self.before[rows], self.after[rows],
+            self.steps[rows], self.last_step[rows],
+        )  # fmt: skip
 
 
 class JumpFinder:
@@ -95,9 +105,13 @@ class JumpFinder:
         )
         steps = self._steps + np.cumsum(np.minimum(step, self._size).sum(axis=1))
         self._steps = float(steps[-1])
+        last_step = np.linalg.norm(step[at], axis=1)
         self._changes.append(
-            JumpRows(row, block.t[at + MEDIAN_ROWS], before[at], after[at], steps[at])
-        )
+            JumpRows(
+                row, block.t[at + MEDIAN_ROWS], before[at], after[at], steps[at],
+                last_step,
+            )
+        )  # fmt: skip
 
     @property
     def positions(self) -> list[tuple[float, float]]:
@@ -114,19 +128,23 @@ class JumpFinder:
         begins = np.vstack([self._begin[1], changes.after[last]])
         closes = np.vstack([changes.before[first], self._end[1]])
         rests = (np.abs(closes - begins) <= self._size).all(axis=1)
-        middle = (first + last) // 2
-        return self._spans(JumpRows(*(x[middle] for x in changes)), rests)
+        largest = [
+            a + np.argmax(changes.last_step[a : b + 1])
+            for a, b in zip(first, last, strict=True)
+        ]
+        into = np.array(largest, dtype=np.intp)
+        return self._spans(changes.some(into), rests)
 
     def _spans(
-        self, middles: JumpRows, rests: NDArray[np.bool_]
+        self, jumps: JumpRows, rests: NDArray[np.bool_]
     ) -> list[tuple[float, float]]:
         """Start and end of each position, s, given the rows at which they begin."""
-        time = middles.time
-        rows = np.diff(np.concatenate([[0], middles.row, [self._rows]]))
+        time = jumps.time
+        rows = np.diff(np.concatenate([[0], jumps.row, [self._rows]]))
         long = rows >= FEWEST_ROWS
         if long.sum() < FEWEST_POSITIONS or rests[long].mean() < LEAST_SHARE:
             return []
-        differ = np.diff(np.concatenate([[0.0], middles.steps, [self._steps]])) / rows
+        differ = np.diff(np.concatenate([[0.0], jumps.steps, [self._steps]])) / rows
         quiet = max(float(differ[long].min()), self._least_jump)
         if (differ[long] > LARGEST_SCATTER_RATIO * quiet).mean() > 1 - LEAST_SHARE:
             return []

@@ -23,6 +23,7 @@ from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.rests import SPREAD_CELLS, cell_table, find_rest_runs
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.verdict import FEWEST_JUDGED_CELLS, judge_window
+from fieldcal.windows.window import FEWEST_CELLS
 
 MIN_STRETCHES = 3
 """Number of stretches below which the rests may be too short to omit half a second at
@@ -183,6 +184,7 @@ def _passes_clearly(cells: CellTable, shortest: float) -> tuple[float, float] | 
     first, last = cells.span
     if (
         last - first < shortest
+        or len(cells) < FEWEST_CELLS
         or judge_window(cells, StillnessLimits()).worst.ratio > _CLEARLY
     ):
         return None
@@ -199,7 +201,7 @@ def _passing_parts(
             sums.add(without_spikes(block))
             times = [np.fmin(times[0], block.t[0]), block.t[-1]]
     first, last = float(times[0]), float(times[1])
-    if not last - first >= shortest:
+    if not last - first >= shortest or len(sums.table) < FEWEST_CELLS:
         return []
     worst = judge_window(sums.table, StillnessLimits()).worst
     if worst.ratio <= 1:

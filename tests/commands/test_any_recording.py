@@ -387,6 +387,8 @@ def moved(by: float) -> list[Table]:
     ("made", "positions", "tables", "says"),
     [
         (None, moved(1e5), {}, "check start_s and end_s"),
+        (None, [p | {"end_s": p["start_s"] + 0.1} for p in POSITIONS], {},
+         "samples, and 20 are needed: rest longer, or record at a higher rate"),
         (None, [*POSITIONS, {"start_s": 30.0, "end_s": 40.0}], {},
          "the device cannot be in both"),
         (None, [], {}, "the device is turned in this recording"),

@@ -153,6 +153,25 @@ def test_a_knock_on_the_way_is_no_wild_value(push: float) -> None:
     assert "decode_fault" not in told.ids
 
 
+def test_registers_that_were_read_as_they_changed_are_put_back() -> None:
+    """High byte of one value, low byte of the next: off by 256 counts, up or down."""
+    rng = np.random.default_rng(4)
+    device = replace(TACTICAL, acc_noise=0.01)
+    about = description_file.parse_description(tables(device))
+    ridden = ride(device, seed=3)
+    block = record(device, ridden)
+    six, size = block.six, 256 * 6e-4
+    torn = (rng.random((len(six), 3)) < 4e-3) & (ridden.held >= 0)[:, None]
+    six[:, :3] += size * torn * rng.choice([-1, 1], torn.shape)
+    told = check_chain(with_six(block, six), about)
+    assert [f.values for i, f in told.faults if i == "decode_fault"] == [
+        {"channel": f"a{c}", "kind": "one_size"} for c in "xyz"
+    ]
+    off = np.abs(told.block.acc - block.acc)[torn]
+    assert np.mean(off < size / 20) > 0.95
+    assert not {"bump", "noise_level"} & set(told.ids)
+
+
 @pytest.mark.parametrize("steps", [0.05, 0.3, 1.2])
 def test_steps_however_coarse_are_no_slip(steps: float) -> None:
     device = replace(TACTICAL, acc_noise=0.1, gyr_noise=2e-3, gyr_bias=(0.3, 0.05, 0.0))

@@ -9,8 +9,14 @@ import pytest
 from joined import read_files
 
 from fieldcal.cli import main
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.importing.units.calm_rates import DEG, RAD, guess_unit_of_calm_rates
+from fieldcal.importing.units.calm_rates import (
+    DEG,
+    RAD,
+    guess_unit_of_calm_rates,
+    unit_of_steps,
+)
 from fieldcal.importing.units.rate_size import TurnComparison
 from fieldcal.session.folder import Session
 
@@ -196,3 +202,25 @@ def test_the_steps_of_a_full_scale_tell_the_unit_of_a_calm_device(
     found, _ = read_files([path])
     size = np.deg2rad(counts / lsb)
     np.testing.assert_allclose(found.gyr, size, rtol=1e-3, atol=2e-7)
+
+
+@pytest.mark.parametrize("digits", [5, 4])
+def test_steps_are_counted_to_the_fastest_rates(digits: int) -> None:
+    """Rounded to some digits, one step is not known well enough to count thousands."""
+    counts = np.round(np.random.default_rng(2).normal(0, 900, (400, 3)))
+    found = unit_of_steps(np.round(counts / 16.384, digits))
+    assert found is not None and found.scale is not None
+    assert found.scale.unit == "deg/s"
+
+
+def test_beside_counts_rates_are_offered_as_counts_alone(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    acc = np.round([1000.0, -300.0, 16500.0] + rng.normal(0, 60, (500, 3)))
+    gyr = np.round([-558.0, 111.0, -71.0] + rng.normal(0, 12, (500, 3)))
+    rows = np.column_stack([0.02 * np.arange(500), acc, gyr])
+    lines = [",".join(f"{x:g}" for x in row) for row in rows]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["t,ax,ay,az,gx,gy,gz", *lines]) + "\n")
+    with pytest.raises(InputError, match=r"add --gyr-unit deg/s --gyr-lsb 131") as told:
+        read_files([path])
+    assert "--gyr-unit deg/s or" not in str(told.value)

@@ -420,6 +420,30 @@ def test_what_lacks_gravity_is_no_gain_of_velocity(tmp_path: Path) -> None:
         read_files([path])
 
 
+def test_what_is_called_acceleration_is_no_gain_of_velocity(tmp_path: Path) -> None:
+    """A car without gravity, four rows a second: about what gravity gains in one."""
+    path = tmp_path / "log.csv"
+    rng = np.random.default_rng(5)
+    some, step = 22, 0.2405
+    free = np.array([0.0, 2.35, 0.0]) + rng.normal(0, 0.05, (some, 3))
+    rows = np.column_stack([step * np.arange(some), free])
+    head = "time,accel_x,accel_y,accel_z\n"
+    path.write_text(head + "\n".join(",".join(map(str, r)) for r in rows) + "\n")
+    with pytest.raises(InputError, match="gravity in no usual unit"):
+        read_files([path])
+
+
+@pytest.mark.parametrize("unit", ["", " (m/s^2)", " [m/s²]"])
+def test_about_one_without_gravity_is_no_g(tmp_path: Path, unit: str) -> None:
+    """A telephone in a lift reads 1 m/s^2 for a while."""
+    path = tmp_path / "log.csv"
+    lift = np.array([0.0, 0.1, 1.05]) + np.random.default_rng(6).normal(0, 0.02, (N, 3))
+    head = ",".join(f"Linear Acceleration {x}{unit}" for x in "xyz")
+    path.write_text(text("Time (s)," + head, T, lift) + "\n")
+    with pytest.raises(InputError, match="accelerations without gravity"):
+        read_files([path])
+
+
 def test_of_two_linear_accelerations_that_with_gravity_is_taken(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     head = "time,lin_acc_x,lin_acc_y,lin_acc_z," + ",".join(

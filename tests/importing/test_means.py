@@ -7,15 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joined import read_files
 from laid_about import G, write
 
 from fieldcal.cli import main
+from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.headings.headings import match_headings
 from fieldcal.importing.tables.means import estimate_mean_uncertainty
-from fieldcal.importing.units.gravity_size import are_means
+from fieldcal.importing.units.gravity_size import are_means, estimate_gravity
 from fieldcal.session.folder import Session
 
 BIAS, RATE = np.array([0.1, -0.05, 0.2]), np.array([0.01, -0.02, 0.005])
@@ -208,6 +210,44 @@ def test_samples_are_no_means() -> None:
     noise = np.random.default_rng(7).normal(0, 0.01, (60, 3)) + [0.1, -0.2, 9.8]
     assert not are_means(noise)
     assert not are_means(slow) and not are_means(slow[:2]) and not are_means(0 * slow)
+
+
+def test_what_a_hand_shakes_is_no_table_of_means(tmp_path: Path) -> None:
+    """Ten rows a second, each turned far from the one before."""
+    shaken = means(9, 36)
+    shaken[:, 3:] = np.random.default_rng(9).normal(0, 3, (36, 3))
+    for size, unit in ((1.0, "s"), (1e3, "ms")):
+        t = size * 0.1 * np.arange(36)
+        assert are_means(shaken[:, :3]) and not are_means(shaken[:, :3], t / size)
+        path = write(
+            tmp_path, np.column_stack([t, shaken]), heading=f"t ({unit}),{SIX}"
+        )
+        out = tmp_path / unit
+        assert main(["import", str(path), "-o", str(out), "--gyr-unit", "rad/s"]) == 0
+        made = Session.open(out)
+        assert not made.about.positions and "means" not in made.about.raw
+
+
+def test_rates_tell_what_a_hand_shakes_where_there_are_no_times(
+    tmp_path: Path,
+) -> None:
+    shaken = means(9, 36)
+    shaken[:, 3:] = np.random.default_rng(9).normal(0, 80, (36, 3))
+    for heading in (SIX, "ax,ay,az,gx (deg/s),gy (deg/s),gz (deg/s)"):
+        with pytest.raises(InputError, match="no column is t, the time"):
+            read_files([write(tmp_path, shaken, heading=heading)])
+
+
+def test_rounding_at_rest_is_no_sphere() -> None:
+    """Each axis changes between two numbers: the corners of a box lie on a sphere."""
+    rng = np.random.default_rng(8)
+    at = np.array([0.002, -0.002, 0.9995])
+    rounded = np.round(at + [4e-4, 5e-4, 5e-4] * rng.integers(0, 2, (400, 3)), 4)
+    for rows in (rounded[:40], rounded):
+        assert not are_means(rows)
+        gravity = estimate_gravity(rows)
+        assert gravity is not None and not gravity.round
+        np.testing.assert_allclose(gravity.size, 1, rtol=1e-3)
 
 
 def test_a_scatter_that_is_only_rounding_is_none() -> None:

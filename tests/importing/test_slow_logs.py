@@ -44,6 +44,22 @@ def test_a_short_log_that_may_be_slow_is_asked_about(tmp_path: Path) -> None:
         read_files([write(tmp_path, rows, heading=NAMES)])
 
 
+@pytest.mark.parametrize("size", [1e6, 1e9])
+@pytest.mark.parametrize("rows", [7, 3000])
+def test_a_day_tells_the_unit_of_a_thousand_rows_a_second(
+    tmp_path: Path, size: float, rows: int
+) -> None:
+    """In a coarser unit it would be one row a second, in the year 50000."""
+    moved = turned(4, 1000.0, 1.0)[:rows]
+    stamps = (1730147632 * round(size) + np.arange(rows) * round(size / 1e3)).tolist()
+    cells = ([f"{x:.9g}" for x in row] for row in moved[:, 1:])
+    lines = [",".join([str(at), *row]) for at, row in zip(stamps, cells, strict=True)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([NAMES, *lines]) + "\n")
+    block, _ = read_files([path])
+    np.testing.assert_allclose(np.diff(block.t), 1e-3, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     "rate", [100.0, pytest.param(250.0, marks=pytest.mark.thorough), 500.0]
 )

@@ -12,6 +12,8 @@ from joined import read_files
 from laid_about import turned, write
 
 from fieldcal.cli import main
+from fieldcal.core.errors import InputError
+from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.session.folder import Session
@@ -336,3 +338,21 @@ def test_a_zero_that_is_no_zero_is_refused(
     path = write(tmp_path, turned(1, 50.0))
     assert main(["import", str(path), f"--acc-zero={text}"]) == 2
     assert "write one number or three" in capsys.readouterr().err
+
+
+def test_steps_of_a_power_of_two_are_those_of_g(tmp_path: Path) -> None:
+    """An MPU-6050 may be 0.15 g off on z; its registers are divided by 4096."""
+    rng = np.random.default_rng(4)
+    counts = np.round([400.0, 70.0, 3420.0] + rng.normal(0, 30, (300, 3)))
+    rows = np.column_stack([0.02 * np.arange(300), counts / 4096])
+    path = tmp_path / "log.csv"
+    for divisor, taken in ((4096, True), (4000, False)):
+        rows[:, 1:] = counts / divisor
+        lines = [",".join(f"{x:.12g}" for x in row) for row in rows]
+        path.write_text("\n".join(["t,ax,ay,az", *lines]) + "\n")
+        if taken:
+            block, _ = read_files([path])
+            np.testing.assert_allclose(block.acc, counts / 4096 * G0)
+        else:
+            with pytest.raises(InputError, match="gravity in no usual unit"):
+                read_files([path])

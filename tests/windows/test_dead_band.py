@@ -51,6 +51,21 @@ def test_gyroscopes_that_rest_and_turn_once_show_it(bias: float, noise: float) -
     np.testing.assert_allclose(found, BAND, rtol=0.06)
 
 
+def test_axes_that_each_turn_too_quickly_show_their_band_together() -> None:
+    """A log of ten rows a second has a row of each axis just beyond it, if any."""
+    shown = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        angle = np.pi * np.clip(np.arange(700) % 70 - 50, 0, 20) / 20
+        rate = rng.choice([-1, 1], 10).repeat(70) * np.sin(angle) ** 2
+        gyr = rate[:, None] * np.eye(3)[rng.integers(0, 3, 10)].repeat(70, axis=0)
+        gyr += BAND * (0.4 + 0.1 * rng.standard_normal((700, 3)))
+        found = dead_bands(Block.of(np.arange(700) / 10, swung(1)[:700], banded(gyr)))
+        shown += bool((found[3:] > 0).all())
+        assert (found[3:] < 2 * BAND).all()
+    assert shown > 15
+
+
 def test_a_mean_is_as_uncertain_as_what_the_band_takes_from_it() -> None:
     """Also where only a part of the samples is in the band."""
     rng = np.random.default_rng(3)

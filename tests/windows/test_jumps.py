@@ -41,16 +41,16 @@ def found(acc: Array, cut: int = 10**9) -> list[tuple[float, float]]:
     return jumps.positions
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(9))
 def test_every_rest_is_a_position_from_its_first_row_to_its_last(seed: int) -> None:
     lengths = np.random.default_rng(seed).integers(20, 200, 30).tolist()
     ends = np.cumsum(lengths)
     spans = np.column_stack([ends - lengths, ends - 1]) / HZ
     np.testing.assert_allclose(found(rests(seed, lengths)), spans)
     # a wild row now and then is none that was laid down for itself
+    # one beside a jump does not move it
     near = found(rests(seed, lengths, wild=0.01))
-    assert len(near) == len(spans)
-    assert np.abs(near - spans).max() <= 1.5 / HZ
+    np.testing.assert_allclose(near, spans)
 
 
 @settings(max_examples=15, deadline=None)

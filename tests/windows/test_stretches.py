@@ -422,6 +422,18 @@ def test_fewer_than_two_seconds_are_no_recording() -> None:
     assert len(still_stretches(block)) == len(still_stretches(block, 3.0)) + 1
 
 
+def test_a_stretch_holds_as_many_samples_as_a_mean_takes() -> None:
+    """In a log of rare rows, a few of them last seconds."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        acc = [0, 0, 9.81] + rng.normal(0, 0.02, (24, 3))
+        acc[:8] += rng.normal(0, 0.1, (8, 3))
+        t = np.cumsum(rng.choice([0.75, 3.4], 24, p=[0.65, 0.35]))
+        block = Block.of(t, acc, rng.normal(0, 1e-3, (24, 3)))
+        for start, end in still_stretches(block, 1.0):
+            assert average(block.between(start, end)).n >= 10
+
+
 def test_a_device_of_which_nothing_ever_varies_is_at_rest_or_stuck() -> None:
     block = Block.of(np.arange(2000) / 100, np.zeros((2000, 3)) + [0, 0, 9.81])
     for start, end in still_stretches(block):

@@ -67,6 +67,7 @@ class HeadingMatch:
     usual : unit that rates of such names are in; "" where names tell none
     reversed : channels whose sign is the other one, by what writes such names
     free : whether its accelerations are called as those without gravity are
+    no_gain : whether names say accelerations, and so no gains of velocity
 
     """
 
@@ -77,6 +78,7 @@ class HeadingMatch:
     usual: str = ""
     reversed: frozenset[str] = frozenset()
     free: bool = False
+    no_gain: bool = False
 
     def taken(self, wanted: ReadOptions) -> ReadOptions:
         """Return what the user says, with what the names say."""
@@ -95,6 +97,7 @@ class HeadingMatch:
             usual=self.usual,
             reversed=wanted.reversed | self.reversed,
             free=self.free,
+            no_gain=self.no_gain,
         )
 
     def sentence(

@@ -51,6 +51,8 @@ OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "arri
                "recorded")  # fmt: skip
 """Words of times that are another clock's than the device's."""
 
+ACCELERATION = ("acc", "beschl")
+"""Beginnings of words that say acceleration, and no gain of velocity."""
 
 ANGLES = ("roll", "pitch", "yaw", "heading", "azimuth", "euler", "quat", "quaternion")
 """Words of what a filter computes of an attitude."""
@@ -118,6 +120,16 @@ def match_beside(columns: Sequence[Column], skip: str = "") -> HeadingMatch | No
     warm, says = _thermometer(named, ())
     chosen = [*_plainest(times, OTHER_CLOCK), *parts, *warm]
     return _match(columns, chosen, skip, "0", says) if chosen else None
+
+
+def are_free(columns: Sequence[Column]) -> bool:
+    """Whether columns are called as accelerations without gravity are.
+
+    >>> are_free([Column("", "Linear Acceleration x"), Column("", "ay")])
+    True
+    """
+    said = [heading_meaning(column.name, column.unit) for column in columns]
+    return any(s and s.kind == "a" and s.weak and not s.gain for s in said)
 
 
 def _left_out(names: Sequence[str]) -> str:
@@ -302,5 +314,11 @@ def _match(
     ros = bool(axes) and all(any({*part} <= {*words} for part in ROS) for words in axes)
     half = any(n.says.half for n in chosen)
     usual = HALF_ANGLE if half else "rad/s" if ros else ""
-    free = any(n.says.kind == "a" and n.says.weak and not n.says.gain for n in chosen)
-    return HeadingMatch(tuple(found), units, name, says, usual, reversed_, free)
+    felt = [n for n in chosen if n.says.kind == "a" and not n.says.gain]
+    free = any(n.says.weak for n in felt)
+    # "a" alone may be short for anything
+    words = [w for n in felt for w in words_in_name(columns[n.number].name)]
+    no_gain = free or any(w.startswith(ACCELERATION) for w in words)
+    return HeadingMatch(
+        tuple(found), units, name, says, usual, reversed_, free, no_gain
+    )

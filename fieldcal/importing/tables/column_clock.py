@@ -14,7 +14,11 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing import columns
 from fieldcal.importing.read_options import ReadOptions
-from fieldcal.importing.tables.column_source import ColumnSource, column_numbers
+from fieldcal.importing.tables.column_source import (
+    ColumnSource,
+    column_numbers,
+    rates_in_degrees,
+)
 from fieldcal.importing.tables.column_times import (
     ask_rate_of_counter,
     constant_value,
@@ -112,11 +116,10 @@ class ColumnClock:
         said = self._of.rate_said()
         if said is None:
             at = column_numbers(self._of, wanted)
-            three = [at[c] for c in ("ax", "ay", "az") if c in at]
-            table = (
-                self._of.beginning() if len(three) == len("xyz") else np.empty((0, 0))
-            )
-            means = len(table) and are_means(table[:, three])
+            acc, gyr = ([at[k + x] for x in "xyz" if k + x in at] for k in "ag")
+            table = self._of.beginning() if len(acc) == len("xyz") else np.empty((0, 0))
+            rates = rates_in_degrees(table, gyr, wanted)
+            means = len(table) and are_means(table[:, acc], None, rates)
             # of means nobody knows when: they are counted
             return replace(wanted, rate_hz=1.0) if means else wanted
         rate, where = said

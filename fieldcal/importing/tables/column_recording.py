@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.core.samples import ACC, CHANNELS, Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.headings import headings
 from fieldcal.importing.headings.column_units import (
@@ -31,7 +31,7 @@ from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.axis_triples import unnamed_axes
 from fieldcal.importing.tables.column_choices import ask_of_choices, columns_option
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate
-from fieldcal.importing.tables.column_source import column_numbers
+from fieldcal.importing.tables.column_source import column_numbers, rates_in_degrees
 from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
@@ -131,7 +131,10 @@ class ColumnRecording(Recording):
         at = column_numbers(self, wanted)
         if not {"ax", "ay", "az"} <= set(at) or not len(table):
             return None
-        if not are_means(table[:, [at["a" + axis] for axis in "xyz"]]):
+        t = table[:, at["t"]] * wanted.time_scale if "t" in at else None
+        three = [[at[k + x] for x in "xyz" if k + x in at] for k in "ag"]
+        gyr = rates_in_degrees(table, three[1], wanted)
+        if not are_means(table[:, three[0]], t, gyr):
             return None
         fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
         where = scatter_columns(next(fits, Heading([])).columns)
@@ -228,6 +231,9 @@ class ColumnRecording(Recording):
         if way is None or len(way.columns) != k:
             return wanted
         at = {channel: i for i, channel in told.channels.items()}
+        # names that do not say all may say that gravity is lacking
+        free = headings.are_free([way.columns[at[c]] for c in CHANNELS[ACC] if c in at])
+        wanted = replace(wanted, free=free, no_gain=wanted.no_gain or free)
         return self._with_units_over(wanted, way, at)
 
     def _say_unnamed(self, named: Sequence[HeadingMatch], way: Heading | None) -> None:

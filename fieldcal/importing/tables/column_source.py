@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
+
+import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.read_options import ReadOptions
+from fieldcal.session.units import UNSCALED
 
 
 class ColumnSource(Protocol):
@@ -40,3 +44,18 @@ def column_numbers(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:
         return {name: i for i, (name, _, _) in enumerate(names)}
     places = [c.place for way in source.heading() for c in way.columns]
     return {n: places.index(p) for n, _, p in names if p in places}
+
+
+def rates_in_degrees(
+    table: Array, at: Sequence[int], wanted: ReadOptions
+) -> Array | None:
+    """Rates (n, 3) of three columns, deg/s; as they are where nobody says their unit.
+
+    None where there are no three.
+    """
+    if len(at) != len("xyz") or not len(table):
+        return None
+    said = bool(wanted.gyr_unit) and wanted.gyr_unit not in UNSCALED
+    scale = np.rad2deg(wanted.gyr_scale) if said else 1.0
+    rates: Array = table[:, list(at)] * scale
+    return rates

@@ -15,8 +15,10 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.units.rate_size import STIRS, TIMES, TurnComparison
 from fieldcal.importing.units.scales import (
     GYR_SCALES,
+    RATE_SCALES,
     USUAL_COUNTS,
     Scale,
+    binary_counts,
     gain_scales,
     half_angle_scales,
 )
@@ -42,6 +44,9 @@ FEWEST_STEPS = 2
 SAME_STEP, OFF_STEP = 1.02, 0.1
 """Ratio within which steps are the same, and part of a step by which a number that was
 rounded to some decimals is off one."""
+
+FARTHER = (8, 64, 512, 4096, 65536)
+"""Steps to the values by which a step is found ever more exactly."""
 
 DECIMAL = (1.0, 2.0, 5.0)
 """First digit of steps that are those of decimals."""
@@ -70,7 +75,11 @@ class CalmRateUnit(NamedTuple):
 
 
 def guess_unit_of_calm_rates(
-    gyr: Array, turns: TurnComparison | None, step: float | None, usual: str
+    gyr: Array,
+    turns: TurnComparison | None,
+    step: float | None,
+    usual: str,
+    counts: bool = False,
 ) -> CalmRateUnit:
     """Guess the unit of rates in a recording without turns.
 
@@ -81,6 +90,8 @@ def guess_unit_of_calm_rates(
     step : s, over which rates are what was gained: accelerations are the gain of
         velocity, or names say half the angle; None where not
     usual : unit that rates of such names are in; "" where names tell none
+    counts : whether accelerations are: who writes one sensor's registers as they are,
+        writes the other's so too
 
     """
     plain = [s for s in (RAD, DEG) if not usual or s.unit == usual] + [RAD, DEG]
@@ -108,7 +119,7 @@ def guess_unit_of_calm_rates(
         return CalmRateUnit(RAD, "it is the usual one, and no turn tells")
     shown = f"{fast:.4g}" if fast > MAX_REST_RATE else f"a scatter of {noise:.2g}"
     asks = f"nothing says the unit of its rates, and {shown} rad/s is no rest"
-    return CalmRateUnit(None, "", asks, tuple(_answers(gyr, turns, whole)))
+    return CalmRateUnit(None, "", asks, tuple(_answers(gyr, turns, whole, counts)))
 
 
 def unit_of_steps(gyr: Array) -> CalmRateUnit | None:
@@ -123,7 +134,12 @@ def unit_of_steps(gyr: Array) -> CalmRateUnit | None:
     'rad/s'
     >>> unit_of_steps(0.01 * counts) is None
     True
+    >>> unit_of_steps(np.arange(-45.0, 45.0).reshape(-1, 3) / 128).scale.unit
+    'deg/s'
     """
+    if lsb := binary_counts(gyr, RATE_SCALES):
+        why = f"its steps of {1 / lsb:.4g} are those of {lsb} counts in a deg/s"
+        return CalmRateUnit(DEG, f"{why}, and no turn tells")
     steps = [step for axis in gyr.T if (step := _step(axis))]
     if not steps or max(steps) > SAME_STEP * min(steps):
         return None
@@ -144,7 +160,14 @@ def _step(axis: Array) -> float:
     if len(apart) < FEWEST_STEPS:
         return 0.0
     step = float(np.median(apart[apart < SAME_STEP * apart.min()]))
-    many = (values - values[0]) / step
+    from_middle = values - values[len(values) // 2]
+    # decimals that round a step leave it too rough to count to the farthest values
+    for far in FARTHER:
+        near = from_middle[np.abs(from_middle) <= far * step]
+        counts = np.round(near / step)
+        if counts.any():
+            step = float(counts @ near / (counts @ counts))
+    many = from_middle / step
     if np.abs(many - np.round(many)).max() > OFF_STEP:
         return 0.0
     digits = float(f"{step:.1e}".partition("e")[0])
@@ -158,11 +181,13 @@ def _in_degrees(turns: TurnComparison) -> bool:
     return turns.said >= least and turns.allow(DEG.size, AS_SHOWN)
 
 
-def _answers(gyr: Array, turns: TurnComparison | None, whole: bool) -> list[str]:
-    """Options: those that can be; of whole numbers counts as well."""
+def _answers(
+    gyr: Array, turns: TurnComparison | None, whole: bool, counts: bool
+) -> list[str]:
+    """Options: those that can be; of whole numbers counts as well, or alone."""
     scales = [DEG, *(USUAL_COUNTS if whole else [RAD])]
     fits = [s for s in scales if turns is None or turns.allow(s.size)]
-    if whole and np.abs(gyr).max() > FASTEST:
+    if whole and (counts or np.abs(gyr).max() > FASTEST):
         fits = [s for s in fits if s != DEG]
     said = unit_options("gyr", fits or scales, "deg/s", DEG.size)
     return [f"{a}, if it is so" if a == "--gyr-unit rad/s" else a for a in said]

@@ -25,6 +25,14 @@ FEWEST_FACES, FEWEST_ON_SPHERE = 6, 9
 MIN_ROW_ANGLE_RAD = np.deg2rad(10.0)
 """Angle between successive rows that samples do not have, rad."""
 
+MOST_AT_REST, FINEST_COUNTS = 5.0, 131.072
+"""Most by which rates at rest differ from position to position, deg/s: rad/s, by less;
+and the most counts that are usual in a deg/s."""
+
+BETWEEN_POSITIONS_S = 1.0
+"""Least time from one position to the next, s: a hand that shakes a device turns it by
+as much between two samples."""
+
 _ALIKE = 0.15
 """Part by which lengths of means in a table of them differ."""
 
@@ -42,6 +50,11 @@ _STEPS = 30
 
 _WIDE = 0.05
 """Least share of the directions' variance along any axis, for a sphere."""
+
+_BOX = 0.93
+"""Steps of the numbers in the radius of a sphere, at least. A device at rest changes
+between two neighbouring numbers on each axis, and the corners of that box lie on a
+sphere of sqrt(3) / 2 steps whatever it measures; six faces are one step out or more."""
 
 
 _UNEQUAL = 5 / 3
@@ -70,11 +83,17 @@ def _readings(acc: Array) -> Array:
     return rows
 
 
-def are_means(acc: Array) -> bool:
+def are_means(acc: Array, t: Array | None = None, gyr: Array | None = None) -> bool:
     """Whether rows (n, 3) are means of positions: successive directions differ.
 
     Samples that follow each other point nearly the same way; means of positions do not.
+    Times (n,), s, are those of rows; a unit that nobody says is taken for s. Rates
+    (n, 3), deg/s or in the numbers of the file, are those of a device at rest then.
     """
+    if t is not None and _follow_at_once(t):
+        return False
+    if gyr is not None and _are_of_turns(gyr):
+        return False
     acc = _readings(acc)
     if not FEWEST_MEANS <= len(acc) <= MOST_MEANS:
         return False
@@ -92,10 +111,31 @@ def are_means(acc: Array) -> bool:
     return bool(np.median(turned) > MIN_ROW_ANGLE_RAD)
 
 
-def estimate_gravity(acc: Array) -> GravityReading | None:
-    """Size of gravity in numbers (n, 3) of a file, by (1); None of too few."""
+def _are_of_turns(gyr: Array) -> bool:
+    """Whether rates (n, 3), counts if they are whole, differ as at no rests."""
+    known = gyr[np.isfinite(gyr).all(axis=1)]
+    if not len(known):
+        return False
+    whole = bool((known == np.round(known)).all())
+    most = MOST_AT_REST * (FINEST_COUNTS if whole else 1.0)
+    return bool(np.ptp(known, axis=0).max() > most)
+
+
+def _follow_at_once(t: Array) -> bool:
+    """Whether rows of times (n,), s, come sooner than anybody takes a position."""
+    steps = np.diff(t[np.isfinite(t)])
+    steps = steps[steps > 0]
+    return bool(len(steps) and np.median(steps) < BETWEEN_POSITIONS_S)
+
+
+def estimate_gravity(acc: Array, t: Array | None = None) -> GravityReading | None:
+    """Size of gravity in numbers (n, 3) of a file, by (1); None of too few.
+
+    `t` (n,) are the times of the rows, as in `are_means`.
+    """
+    means = are_means(acc, t)
     acc = _readings(acc)
-    if are_means(acc):
+    if means:
         return _gravity_of(acc)
     if len(acc) < MIN_ROWS_ALONE:
         return None
@@ -181,4 +221,19 @@ def _fit_sphere(points: Array, fewest: int = FEWEST_ON_SPHERE) -> tuple[Array, f
     share = np.linalg.eigvalsh(np.cov(away.T))[0] / radius**2
     if np.quantile(departs, 0.9) > _ROUND or share < _WIDE:
         return middle, 0.0
+    if unit * radius < _BOX * _step_of_numbers(points):
+        return middle, 0.0
     return middle + unit * found[:3], unit * radius
+
+
+def _step_of_numbers(points: Array) -> float:
+    """Largest of the steps (m, 3) numbers take on an axis; 0 if they never change.
+
+    >>> _step_of_numbers(np.array([[2.0, 1.0, 0.0], [2.5, 1.0, 0.0], [3.5, 1.0, 0.0]]))
+    0.5
+    """
+    # sums of binary fractions differ in their last digit
+    steps = np.diff(np.sort(points, axis=0), axis=0)
+    steps[steps < 1e-9 * np.abs(points).max()] = np.inf
+    least = steps.min(axis=0)
+    return float(least.max(where=np.isfinite(least), initial=0.0))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array
 
 MIN_ROWS_ALONE = 8
 """Rows whose length tells a unit, if nothing else."""
@@ -150,6 +151,37 @@ def half_angle_scales(step: float) -> tuple[Scale, ...]:
     They are its sine, which lacks a 24th of the square of the angle: 0.05 % of 6 deg.
     """
     return gain_scales(step / 2, "rad/s")
+
+
+FULL_SCALES = range(10, 17)
+"""Exponents of two of the counts in one g that 16 bits over 1 to 32 g make."""
+
+DIFFERENT = 8
+"""Different numbers that are whole counts of a power of two by no chance."""
+
+
+RATE_SCALES = range(4, 9)
+"""The same of the counts in one deg/s that some gyroscopes have."""
+
+
+def binary_counts(numbers: Array, exponents: range = FULL_SCALES) -> int:
+    """Counts in one of the unit of numbers (n, 3), if a power of two; else 0.
+
+    A program that divides the registers by the counts in one g, which are a power of
+    two, writes such numbers; those in m/s^2 or of decimals are none.
+
+    >>> counts = np.arange(3000, 3300).reshape(-1, 3)
+    >>> [binary_counts(counts / n) for n in (4096, 4096 / 9.80665, 4000)]
+    [4096, 0, 0]
+    """
+    shown = np.unique(numbers[np.isfinite(numbers)])
+    if len(shown) < DIFFERENT:
+        return 0
+    for exponent in exponents:
+        counts = shown * 2**exponent
+        if np.abs(counts - np.round(counts)).max() < 1e-6:
+            return 0 if exponent == exponents[0] else 2**exponent
+    return 0
 
 
 def rounded_text(number: float, digits: int = 3) -> str:

@@ -53,7 +53,9 @@ def settle_units(recording: Recording, stream: str) -> AssumedUnits:
         return AssumedUnits(heard.guessed)
     alone = len(parts) == 1
     said, columns = _stated_units(parts), _columns_of_rates(parts)
-    guess = UnitGuess(str(recording.path), said, block, columns, alone)
+    # several files settle the units of their times themselves
+    began = heard.began if alone and np.isfinite(heard.began) else 0.0
+    guess = UnitGuess(str(recording.path), said, block, columns, alone, began)
     if guess.said.acc_unit not in UNSCALED and guess.acc_bias is None:
         check_one_unit(parts)
     for part in parts:

@@ -60,14 +60,18 @@ UNIX = (1e9, 4e9)
 """Times of day since 1970, s: 2001 to 2096."""
 
 
-def possible_time_units(t: Array) -> list[str]:
-    """Possible units of the times (n,) of a file."""
+def possible_time_units(t: Array, began: float = 0.0) -> list[str]:
+    """Possible units of the times (n,) of a file, which count from `began`."""
     t = t[np.isfinite(t)]
     steps = np.diff(t)
     steps = steps[steps > 0]
-    if len(steps) < MIN_ROWS_ALONE:
+    if not len(steps):
         return []
-    day = [u for u, n in TIME_SIZES.items() if UNIX[0] <= t[-1] / n < UNIX[1]]
+    last = float(t[-1]) + began
+    day = [u for u, n in TIME_SIZES.items() if UNIX[0] <= last / n < UNIX[1]]
+    if len(steps) < MIN_ROWS_ALONE:
+        # too few for a rate; a day that s would put beyond all is one all the same
+        return [u for u in day if TIME_SIZES[u] > TIME_SIZES["s"]]
     step = float(np.median(steps))
     low, high = RATES_HZ
     usual = [u for u, n in TIME_SIZES.items() if low <= n / step <= high]
@@ -80,10 +84,13 @@ def possible_time_units(t: Array) -> list[str]:
     return [u for u in usual if span / TIME_SIZES[u] >= MIN_RECORDING_S] or usual
 
 
-def assumed_time_unit(name: str, t: Array, acc: Array | None = None) -> tuple[str, str]:
+def assumed_time_unit(
+    name: str, t: Array, acc: Array | None = None, began: float = 0.0
+) -> tuple[str, str]:
     """Unit taken for the times (n,) of a recording, and why; "" where it is s.
 
-    Forces (n, 3) tell a slow log in s from a fast one in ms.
+    Forces (n, 3) tell a slow log in s from a fast one in ms. Where times count from
+    their first row, its own, `began`, may be a day.
 
     Raises
     ------
@@ -91,14 +98,16 @@ def assumed_time_unit(name: str, t: Array, acc: Array | None = None) -> tuple[st
         With a question and its answers, where several would do.
 
     """
-    fits, step = possible_time_units(t), _step(t)
-    if len(fits) == 1 and step and SLOW_HZ <= 1 / step < RATES_HZ[0]:
-        size = TIME_UNITS[fits[0]]
+    fits, step = possible_time_units(t, began), _step(t)
+    finer = [u for u in fits if u != "s"]
+    if len(finer) == 1 and step and SLOW_HZ <= 1 / step < RATES_HZ[0]:
+        size = TIME_UNITS[finer[0]]
         if acc is not None and turns_at_once(acc, size * step):
-            why = f"in {fits[0]} it would be turned faster than anything is"
+            why = f"in {finer[0]} it would be turned faster than anything is"
             return "s", f"s, which makes {1 / step:.4g} Hz: {why}"
         brief = size * float(np.nanmax(t) - np.nanmin(t)) < MIN_RECORDING_S
-        fits = ["s", *fits] if brief and 1 / step >= STATED_HZ else fits
+        brief = brief and 1 / step >= STATED_HZ
+        fits = ["s", *finer] if brief else fits
     if len(fits) > 1:
         rates = (f"{1 / (TIME_UNITS[u] * step):.4g} Hz in {u}" for u in fits)
         raise InputError(

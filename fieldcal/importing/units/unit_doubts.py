@@ -137,6 +137,12 @@ class StatedUnits:
                 " taken out of these accelerations, and nothing can be calibrated by"
                 f" them; {LOG_GRAVITY}"
             )
+        if self._said.free and "a" in self._said.named:
+            raise InputError(
+                f"{self._name}: |a| at rest is {gravity.size:.3g} m/s^2, and the names"
+                " of its columns are those of accelerations without gravity: nothing"
+                f" can be calibrated by them; {LOG_GRAVITY}"
+            )
         fits = _within(gravity.size / self._said.acc_scale, ACC_SCALES)
         shows = f"|a| at rest is {gravity.size:.4g} m/s^2 then, not gravity"
         self._ask_zero(gravity, shows)

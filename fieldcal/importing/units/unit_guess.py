@@ -30,6 +30,7 @@ from fieldcal.importing.units.scales import (
     GYR_OUT,
     MIN_ROWS_ALONE,
     Scale,
+    binary_counts,
     fitting_scales,
     gain_scales,
     half_angle_scales,
@@ -80,6 +81,7 @@ class UnitGuess:
     name, said, block : of the recording, what is said of it, and its beginning
     columns : in which the rates stand
     alone : whether it is one file: those of several may be in different units
+    began : time of the first row by the clock of the file, 0 if unknown
 
     Attributes
     ----------
@@ -97,24 +99,28 @@ class UnitGuess:
         block: Block,
         columns: NamedColumns,
         alone: bool = True,
+        began: float = 0.0,
     ) -> None:
         self._alone, self._columns = alone, columns
         self.found: dict[str, str] = {}
         self.acc_bias: list[float] | None = None
         self.doubts: list[str] = []
         self._name, self.said, self._read = name, said, said
+        # a rate is that of samples, or of means that are counted
+        of_rows = None if said.rate_hz else block.t
+        means = are_means(block.acc, of_rows)
         # of means, the pauses between them say nothing
-        if not (said.time_unit or said.rate_hz or are_means(block.acc)):
-            unit, why = assumed_time_unit(name, block.t, block.acc)
+        if not (said.time_unit or said.rate_hz or means):
+            unit, why = assumed_time_unit(name, block.t, block.acc, began)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
-        elif "t" in said.named and not (said.batch or are_means(block.acc)):
+        elif "t" in said.named and not (said.batch or means):
             check_stated_times(name, said.time_unit, block.t)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
         self._zero = said.acc_scale * said.zero
         written, block = block.acc, replace(block, acc=block.acc - self._zero)
-        gravity = estimate_gravity(block.acc)
+        gravity = estimate_gravity(block.acc, of_rows)
         self._step = usual_step(t) if said.rate_hz is None else 1 / said.rate_hz
         if gravity and not said.acc_unit and said.acc_lsb == 1:
             self._acceleration(gravity, written)
@@ -148,12 +154,15 @@ class UnitGuess:
     def _acceleration(self, gravity: GravityReading, acc: Array) -> None:
         fits = fitting_scales(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
         fits = scales_of_decimals(fits, acc)
-        if not fits and self._step and not self.said.free:
-            scales = gain_scales(self._step, "m/s^2", G0)
-            fits = fitting_scales(gravity.size, scales, ACC_OUT[not gravity.round])
         shows = f"|a| at rest is {rounded_text(gravity.size, 4)}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
+        if not fits and gravity.size >= NO_UNIT and (lsb := binary_counts(acc)):
+            fits = [scale for scale in ACC_SCALES if str(scale) == "g"]
+            shows += f", and its steps are those of {lsb} counts in a g"
+        if not fits and self._step and not self.said.no_gain:
+            scales = gain_scales(self._step, "m/s^2", G0)
+            fits = fitting_scales(gravity.size, scales, ACC_OUT[not gravity.round])
         if not fits and gravity.size < NO_UNIT:
             raise InputError(
                 f"{self._name}: {shows}, less than gravity reads in any unit: it seems"
@@ -171,6 +180,13 @@ class UnitGuess:
                 " not, say the unit",
                 (unit_options("acc", fits, "g", 1) if fits else PLAIN_UNITS)
                 + zero_options(self.said, gravity),
+            )
+        if self.said.free and fits and fits[0].unit != "m/s^2" and not gravity.round:
+            self._ask(
+                f"{shows}, and the names of its columns are those of accelerations"
+                f" without gravity, by which nothing can be calibrated ({LOG_GRAVITY});"
+                " if it is in them, say the unit",
+                unit_options("acc", fits, "g", gravity.size),
             )
         if len(fits) != 1:
             self._ask(
@@ -256,7 +272,8 @@ class UnitGuess:
         """Rates of which no turn tells."""
         turns = gravity and compare_turns(block.t, block.acc, block.gyr, gravity)
         gained = self._step if self._gained or self._halved else None
-        found = guess_unit_of_calm_rates(gyr, turns, gained, self.said.usual)
+        counts = self.said.acc_lsb != 1 and gained is None
+        found = guess_unit_of_calm_rates(gyr, turns, gained, self.said.usual, counts)
         if found.scale is None:
             self._ask(found.asks, [*found.answers])
         else:

@@ -158,26 +158,34 @@ def _in_other_dictionary(
     if not all(has_equation(g) for g in wanted):
         every = {c.key: c.with_size(size.get(c.key))
                  for c in [*random_causes(d), *unknown_causes(d)]}  # fmt: skip
-    new: dict[str, list[tuple[Group, list[Group]]]] = {}
+    new: dict[str, dict[Group, list[Group]]] = {}
     for group, cause in wanted.items():
         if has_equation(group):
             if group.effect is not None and group.effect.acts_on(d.x):
-                new.setdefault(cause.key, []).append((group, _group_variants(d, group)))
+                there = new.setdefault(cause.key, {})
+                alike = [there[g] for g in there if _same_but_for_size(g, group)]
+                there[group] = alike[0] if alike else _group_variants(d, group)
         elif cause.key in every:
             same = every[cause.key]
             yield group, (same, same.variants[cause.variants.index(group)])
     for cause in {c.key: c for c in wanted.values()}.values():
-        pairs = new.get(cause.key, [])
-        variants = tuple(
-            variant for _, own_variants in pairs for variant in own_variants
-        )
+        pairs = new.get(cause.key, {})
+        variants = tuple(dict.fromkeys(v for every in pairs.values() for v in every))
         instants = [(at, at) for g in cause.expected for at in g.shape.values()]
         sized = replace(cause, variants=variants).with_size(size.get(cause.key))
         same = sized.expecting_within(instants)
-        for group, own_variants in pairs:
-            off = (g for g in same.expected if g.shape == group.shape)
+        for group, own_variants in pairs.items():
+            off = (g for g in group.with_same_parameters(same.variants)
+                   if g in same.expected and g.shape == group.shape)  # fmt: skip
             own = same.variants[variants.index(own_variants[0])]
             yield group, (same, next(off, own) if group in cause.expected else own)
+
+
+def _same_but_for_size(one: Group, other: Group) -> bool:
+    """Whether two groups differ at most in the size that is known of them."""
+    free = (replace(g, fixed_size=None) for g in (one, other))
+    (a, b) = (g.identity for g in free)
+    return a == b and one.shape == other.shape
 
 
 def _group_variants(d: Dictionary, group: Group) -> list[Group]:

@@ -115,6 +115,25 @@ def test_a_cause_is_as_large_as_its_likeliest_explanation_has_it(name: str) -> N
     assert {g.fixed_size for g in (*cause.variants, group)} == {None}
 
 
+def test_a_restart_is_carried_with_the_jump_that_it_had() -> None:
+    """Of the three sizes, wherever they are in memory, and each in the set once."""
+    cause, first = member("bias_step", (0, 1, 2))
+    (at_s,) = first.shape.values()
+    cause = cause.expecting_within([(at_s - 1e-3, at_s + 1e-3)])
+    jumps = [g for g in cause.variants if g in cause.expected]
+    shown = [
+        WeightedExplanation(((cause, g),), p, sizes=(1.0,))
+        for g, p in zip(jumps, (0.2, 0.5, 0.3), strict=True)
+    ]
+    found = given(shown).explanations
+    assert [s.probability for s in found] == pytest.approx([0.5, 0.3, 0.2])
+    for one, jump in zip(found, (jumps[1], jumps[2], jumps[0]), strict=True):
+        ((same, group),) = one.members
+        np.testing.assert_allclose(group.own_sigma(), jump.own_sigma())
+        assert group in same.expected and group.shape == jump.shape
+        assert len(same.expected) == len(jumps)
+
+
 def test_what_is_uncertain_beside_a_cause_does_not_make_it_smaller() -> None:
     """Badly set angles hide a drift: its size is the one found, and not the least."""
 

@@ -110,8 +110,8 @@ def _restarts(sets: Sets) -> Iterator[Set]:
     """
     jumps: dict[float, dict[Cause, list[Group]]] = {}
     for cause in sets.dictionary.causes:
-        for group in cause.expected:
-            if isinstance(group.effect, BiasChange):
+        for group in cause.variants:
+            if group in cause.expected and isinstance(group.effect, BiasChange):
                 (at_s,) = group.shape.values()
                 jumps.setdefault(at_s, {}).setdefault(cause, []).append(group)
     if jumps:

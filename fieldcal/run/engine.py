@@ -320,7 +320,7 @@ class Engine:
     ) -> None:
         """Report that the device rests in a wrong position, and finally give up."""
         if quiet:
-            waiting.restart_waiting()
+            waiting.discount_latest()
         elif (waited := waiting.alarm_due()) is not None:
             text = reminder(waited) + waiting.problem
             self._recorder.mark("wrong", position=hold.index, text=text)

@@ -68,7 +68,8 @@ class PositionWait:
     arrival : where the device rests, None while it moves
     where : where it is, also while it moves; None while that is unknown
     f : (3,) specific force at rest, procedure axes, m/s^2; None while it moves
-    waited : s of samples since it was asked for, by the device's clock
+    waited : s of samples since it was asked for, by the device's clock, in which nobody
+        was turning it
     waited_host : the same by the host's clock
 
     """
@@ -86,11 +87,11 @@ class PositionWait:
         self._units = units
         self._address = str(about.raw.get("run", {}).get("device", ""))
         self._others = _other_positions(hold, about)
-        self._began: float | None = None
         self._first: Array | None = None
         self._turned = False
         self._start()
         self._last = self._last_host = self._stirred = np.nan
+        self._latest = self._latest_host = 0.0
         self.waited = self.waited_host = 0.0
 
     def _start(self) -> None:
@@ -124,16 +125,17 @@ class PositionWait:
             If an axis of the accelerometers gives no value, also at rest.
 
         """
-        if self._last_host < host:
-            self.waited_host += min(MAX_GAP_S, host - self._last_host)
+        since = self._last_host if self._last_host < host else host
+        self._latest_host = min(MAX_GAP_S, host - since)
         self._last_host = host
-        away = float(block.t[0]) - self._last
-        if away > MAX_GAP_S:
+        gap = float(block.t[0]) - self._last > MAX_GAP_S
+        if gap:
             self._start()
-            self._began = None if self._began is None else self._began + away
+        began = float(block.t[0]) if gap or np.isnan(self._last) else self._last
         self._last = float(block.t[-1])
-        self._began = float(block.t[0]) if self._began is None else self._began
-        self.waited = self._last - self._began
+        self._latest = self._last - began
+        self.waited += self._latest
+        self.waited_host += self._latest_host
         self._stillness.add(block)
         self._resting.add(block, self._stillness.since)
         if self._stillness.since is not None or np.isnan(self._stirred):
@@ -232,10 +234,15 @@ class PositionWait:
         problem = self.arrival.problem if self.arrival else ""
         return said and f"{said}; else {problem}"
 
-    def restart_waiting(self) -> None:
-        """Restart the waiting time, while the device is still being turned."""
-        self._began = self._last
-        self.waited = self.waited_host = 0.0
+    def discount_latest(self) -> None:
+        """Do not count the latest block as waiting: the device is still being turned.
+
+        What was waited before counts: a mover that is told once more, and turns nothing
+        again, must not be waited for without end.
+        """
+        self.waited -= self._latest
+        self.waited_host -= self._latest_host
+        self._latest = self._latest_host = 0.0
 
     def has_waited_enough(self, give_up: float) -> bool:
         """Whether the wait exceeds `give_up` s by device and by host time."""
@@ -251,11 +258,11 @@ class PositionWait:
         if self.reason.state is not WaitState.MISPLACED or self.f is None:
             return None
         again = not self._has_moved_from(self._told_of)
-        if again and self._last - self._told < REMIND_EVERY_S:
+        if again and self.waited - self._told < REMIND_EVERY_S:
             return None
         if not self._turned and self.waited < UNTURNED_ALARM_S:
             return None
-        self._told, self._told_of = self._last, self.f
+        self._told, self._told_of = self.waited, self.f
         return self.waited if again else 0.0
 
     def _has_moved_from(self, place: Array | None) -> bool:

@@ -15,7 +15,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator import terminal
 from fieldcal.run.operator.banner import can_draw, draw_large
-from fieldcal.run.operator.protocol import Phase
+from fieldcal.run.operator.protocol import TAKEN_BEFORE, Phase
 from fieldcal.run.operator.redrawing import Redrawing
 from fieldcal.run.operator.terminal import ConsoleOperator
 from fieldcal.run.position_check import PositionCheck
@@ -167,6 +167,22 @@ def test_a_link_that_is_silent_is_said_large_and_for_as_long_as_it_is(
     assert "N O   S A M P L E S" in said and "! no samples come from ttyUSB0" in said
     operator.show(view("turning"))
     assert "S A M P L E S" not in screen(operator)
+
+
+def test_a_lost_device_is_said_once_and_what_was_told_survives_what_is_done() -> None:
+    operator = sized(80, 24)
+    silent = WaitReason(WaitState.NO_SAMPLES, "no samples come from ttyUSB0: check it")
+    operator.show(view("silent", reason=silent))
+    operator.tell("ttyUSB0 went silent: goes on by itself, within 117 s")
+    shown = screen(operator)
+    assert "N O   S A M P L E S" in shown and "within 117 s" in shown
+    assert "no samples come from" not in shown  # twice the same, in other words
+    operator.tell("samples come from ttyUSB0 again")
+    before = Hold(0, FIVE_POSITIONS[0], 30.0)
+    operator.show(view("taken", hold=before, reason=TAKEN_BEFORE))
+    operator.place(HOLD)
+    shown = screen(operator)
+    assert "samples come from ttyUSB0 again" in shown and "117 s" not in shown
 
 
 def test_hands_off_does_not_ask_to_be_turned_on(operator: ConsoleOperator) -> None:

@@ -44,6 +44,7 @@ from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait, measured_force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.run.window_taking import WindowTaker
+from fieldcal.run.zero_rates_watch import ZeroRatesWatch
 from fieldcal.session.description import Description
 from fieldcal.session.marks import POSITION_ADDED
 from fieldcal.session.position_tables import position_table
@@ -106,6 +107,7 @@ class Engine:
         self._restarts = driver.health.restarts
         self._units = GyroUnitWatch(about.gravity)
         self._mixed = MixedDevicesWatch()
+        self._zero_rates = ZeroRatesWatch(about.grade)
         self._warned = set[tuple[int, str]]()
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver, self._left_out)
@@ -231,6 +233,7 @@ class Engine:
             try:
                 average = self._windows.average(hold, pieces)
                 if average is not None:
+                    self._zero_rates.add_window(average)
                     self._warn_if_warming_up()
                     self._warned.clear()  # what was said of a turn is gone
                     self._warn_of_samples(hold)
@@ -299,6 +302,8 @@ class Engine:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.notice)
             self._display.show_turning(hold, waiting, reason)
             shown = reason.state
+            if waiting.arrived:
+                self._zero_rates.add_rest(waiting.rates_at_rest)
             self._warn_of_samples(hold)
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
@@ -310,7 +315,8 @@ class Engine:
 
     def _warn_of_samples(self, hold: Hold) -> None:
         """Say once a position what is wrong with the samples: a unit, two devices."""
-        for notice in (self._units.notice, self._mixed.notice):
+        watches = (self._units, self._mixed, self._zero_rates)
+        for notice in (watch.notice for watch in watches):
             if notice and (hold.index, notice) not in self._warned:
                 self._warned.add((hold.index, notice))
                 self._desk.tell(notice)

@@ -25,8 +25,9 @@ ZERO_SIGMAS = 3.0
 """Rates at rest within so many standard errors of zero are taken as without bias."""
 
 ZEROED_NOTICE = (
-    "; its rates are zero at rest: it takes their bias out itself; switch that off"
-    " (gyro bias estimation, zero velocity update), or the result is NO-GO"
+    "the rates are zero at rest: if the device takes their bias out itself (gyro bias"
+    " estimation, zero velocity update), switch that off, as a bias that is taken out"
+    " cannot be measured"
 )
 """Notice about rates without a bias."""
 
@@ -62,8 +63,8 @@ def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
     gravity : m/s^2
 
     """
-    centred = _rates_are_zero(block.gyr)
-    zero = ZEROED_NOTICE * centred
+    centred = rates_are_zero(block.gyr)
+    zero = f"; {ZEROED_NOTICE}" * centred
     if not np.isfinite(block.acc).any(axis=0).all():
         summary = "it sends no accelerations along all three axes"
         return DeviceIntroduction("", PLAIN_MOUNTING, centred, summary + zero)
@@ -79,16 +80,15 @@ def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
     return DeviceIntroduction(up, mounting, centred, f"{up} is up{zero}")
 
 
-def _rates_are_zero(gyr: Array) -> bool:
+def rates_are_zero(gyr: Array) -> bool:
     """Whether rates (n, 3) at rest are zero on each axis, by their own noise."""
     known = gyr[np.isfinite(gyr).all(axis=1)]
     if len(known) < 2:
         return False
     noise = np.diff(known, axis=0).std(axis=0) / np.sqrt(2)
     error = noise / np.sqrt(len(known))
-    return bool(
-        (noise > 0).all() and (np.abs(known.mean(axis=0)) < ZERO_SIGMAS * error).all()
-    )
+    # of one that sends nothing but zeros at rest both are zero
+    return bool((np.abs(known.mean(axis=0)) <= ZERO_SIGMAS * error).all())
 
 
 def rate_unit_from_turn(

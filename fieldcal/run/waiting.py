@@ -174,6 +174,11 @@ class PositionWait:
         return check_position(wanted, f, g, self._previous, self._others, self._address)
 
     @property
+    def rates_at_rest(self) -> Array:
+        """Rates of the last second at rest, (n, 3) rad/s; none while it moves."""
+        return self._resting.block.gyr if self.seconds > 0 else np.zeros((0, 3))
+
+    @property
     def arrived(self) -> bool:
         """Whether the device rests in the requested position."""
         there = self.arrival is not None and self.arrival.ok

@@ -71,6 +71,12 @@ def test_a_device_that_takes_its_bias_out_is_seen() -> None:
     centred = at_rest(f, np.zeros(3))
     centred = Block.of(centred.t, centred.acc, centred.gyr - centred.gyr.mean(axis=0))
     assert "takes their bias out itself" in introduce_device(centred, 9.81).summary
+    zeros = Block.of(
+        centred.t, centred.acc, np.zeros((N, 3))
+    )  # while it thinks it rests
+    assert "takes their bias out itself" in introduce_device(zeros, 9.81).summary
+    stuck = Block.of(centred.t, centred.acc, np.full((N, 3), 0.01))
+    assert not introduce_device(stuck, 9.81).rates_zeroed
     assert (
         "bias out" not in introduce_device(at_rest(f, np.full(3, 0.01)), 9.81).summary
     )

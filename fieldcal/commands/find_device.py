@@ -55,7 +55,8 @@ def find_device(args: argparse.Namespace, mounted: bool = False) -> None:
     url = found.url
     gravity = args.gravity or DEFAULT_GRAVITY
     with _open_device(url) as driver:
-        known = introduce_device(_first_samples(driver), gravity)
+        first, stated = _first_samples(driver), bool(driver.notes.get("installed"))
+        known = introduce_device(first, gravity, stated)
         asks = not args.headless and sys.stdin.isatty()
         if asks and TEXT_FORMAT in url and "gx" in url and "gyr_unit" not in url:
             _print_line("turn the device by hand by 45° or more, and put it back ...")

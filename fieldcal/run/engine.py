@@ -107,7 +107,8 @@ class Engine:
         self._restarts = driver.health.restarts
         self._units = GyroUnitWatch(about.gravity)
         self._mixed = MixedDevicesWatch()
-        self._zero_rates = ZeroRatesWatch(about.grade)
+        stated = bool(driver.notes.get("installed"))
+        self._zero_rates = ZeroRatesWatch(about.grade, stated)
         self._warned = set[tuple[int, str]]()
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver, self._left_out)

@@ -43,7 +43,7 @@ class DeviceIntroduction:
     ----------
     up : device axis that is up, as in "+z"; empty if none is, or if it reads no gravity
     mounting : mounting with which the device is at home; the plain one by default
-    rates_zeroed : whether its rates are zero at rest
+    rates_zeroed : whether its rates are zero at rest, for no reason that it states
     summary : one sentence about all of them
 
     """
@@ -54,16 +54,19 @@ class DeviceIntroduction:
     summary: str
 
 
-def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
+def introduce_device(
+    block: Block, gravity: float, bias_stated: bool = False
+) -> DeviceIntroduction:
     """Determine the properties of a device from samples at rest.
 
     Parameters
     ----------
     block : a second or more, SI, device axes
     gravity : m/s^2
+    bias_stated : whether the device states what it takes out, so that it is put back
 
     """
-    centred = rates_are_zero(block.gyr)
+    centred = not bias_stated and rates_are_zero(block.gyr)
     zero = f"; {ZEROED_NOTICE}" * centred
     if not np.isfinite(block.acc).any(axis=0).all():
         summary = "it sends no accelerations along all three axes"

@@ -23,6 +23,7 @@ class ZeroRatesWatch:
     Parameters
     ----------
     grade : of the device
+    stated : whether the device states what it takes out, so that it is put back
 
     Attributes
     ----------
@@ -31,8 +32,8 @@ class ZeroRatesWatch:
 
     """
 
-    def __init__(self, grade: str) -> None:
-        self._decided = grade == EARTH_RATE_GRADE
+    def __init__(self, grade: str, stated: bool = False) -> None:
+        self._decided = stated or grade == EARTH_RATE_GRADE
         self.notice = ""
 
     def add_rest(self, gyr: Array) -> None:

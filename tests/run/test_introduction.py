@@ -75,6 +75,7 @@ def test_a_device_that_takes_its_bias_out_is_seen() -> None:
         centred.t, centred.acc, np.zeros((N, 3))
     )  # while it thinks it rests
     assert "takes their bias out itself" in introduce_device(zeros, 9.81).summary
+    assert not introduce_device(zeros, 9.81, bias_stated=True).rates_zeroed
     stuck = Block.of(centred.t, centred.acc, np.full((N, 3), 0.01))
     assert not introduce_device(stuck, 9.81).rates_zeroed
     assert (

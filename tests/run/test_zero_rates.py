@@ -42,9 +42,10 @@ def test_a_bias_that_a_window_shows_withdraws_it() -> None:
     noise = 2e-3 * rng.standard_normal((100, 3))
     noise -= noise.mean(axis=0)
     watch, precise = ZeroRatesWatch("tactical"), ZeroRatesWatch("navigation")
-    for each in (watch, precise):
+    autopilot = ZeroRatesWatch("tactical", stated=True)  # averages them at each start
+    for each in (watch, precise, autopilot):
         each.add_rest(noise)
-    assert CLAIM in watch.notice and not precise.notice
+    assert CLAIM in watch.notice and not precise.notice and not autopilot.notice
     watch.add_window(window(0.0))
     assert watch.notice
     watch.add_window(window(3e-4))

@@ -74,6 +74,8 @@ class Engine:
     added : positions of the session beyond the planned ones; new ones are appended
     left_out : numbers of positions that the operator has left out, which are not asked
         for again; new ones are added
+    insisted : numbers of positions that were taken although they looked wrong; new ones
+        are added
 
     """
 
@@ -90,6 +92,7 @@ class Engine:
         judge: Callable[[bool], object] = lambda quick: None,
         added: list[Position] | None = None,
         left_out: set[int] | None = None,
+        insisted: set[int] | None = None,
     ) -> None:
         self._driver = driver
         self._operator = operator
@@ -101,7 +104,9 @@ class Engine:
         self._judge = judge
         self._added = [] if added is None else added
         self._left_out = set[int]() if left_out is None else left_out
+        self._insisted = set[int]() if insisted is None else insisted
         self._held: AcceptedPosition | None = None
+        self._doubted: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
         self._before: int | None = None
         self._restarts = driver.health.restarts
@@ -138,7 +143,7 @@ class Engine:
         reply: object = None
         error: FieldcalError | None = None
         if self._before not in self._taken:  # discarded: others are not judged by it
-            self._held = self._before = None
+            self._held = self._doubted = self._before = None
         try:
             while True:
                 step = plan.throw(error) if error else plan.send(reply)
@@ -164,7 +169,7 @@ class Engine:
                     self._display.show_taken_before(step, average)
                 if step.position.oriented:
                     f = measured_force(average.mean[None, :3], self._about)
-                    self._held = AcceptedPosition(step.position, f)
+                    self._note_reference(step.index, AcceptedPosition(step.position, f))
                 self._before = step.index
                 return average
             case Note(text):
@@ -177,6 +182,13 @@ class Engine:
                 return None
             case Judge(quick):
                 return self._judge(quick)
+
+    def _note_reference(self, index: int, here: AcceptedPosition) -> None:
+        """Note the position by which the next one is judged."""
+        if index in self._insisted:
+            self._doubted = here
+        else:
+            self._held, self._doubted = here, None
 
     def _add_position(self, step: Add) -> int:
         """Add a position to the session; returns its number."""
@@ -208,6 +220,7 @@ class Engine:
         while True:
             name = hold.position.name
             self._recorder.mark("asked", position=hold.index, name=name)
+            self._insisted.discard(hold.index)
             self._operator.place(hold)
             try:
                 average = self._average_position(hold)
@@ -273,7 +286,9 @@ class Engine:
     def _wait_for_arrival(self, hold: Hold) -> None:
         """Wait until the device rests where it should."""
         left = self._windows.disturbed_index == hold.index
-        waiting = PositionWait(hold, self._about, self._held, left, self._units)
+        waiting = PositionWait(
+            hold, self._about, self._held, left, self._units, self._doubted
+        )
         asked = self._driver.host_time()
         insisted = warned = False
         shown = WaitState.NOTHING
@@ -295,6 +310,7 @@ class Engine:
             elif wish == "confirm" and not waiting.arrived:
                 if insisted:
                     self._desk.record_insistence(hold, waiting.problem)
+                    self._insisted.add(hold.index)
                     return
                 insisted = self._desk.ask_back(waiting)
             waits = self._warm_up is not None and self._warm_up.must_wait

@@ -35,7 +35,12 @@ from fieldcal.run.plan_file import WARM_UP, PlanTask
 from fieldcal.run.reconnection import Reconnection
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description_file import with_added_positions
-from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
+from fieldcal.session.marks import (
+    MARKS,
+    POSITION_ADDED,
+    insisted_positions,
+    read_marks,
+)
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average
 
@@ -129,6 +134,7 @@ class SessionRun:
             self._judge,
             self._added,
             self._left_out,
+            {*insisted_positions(read_marks(recorder.folder / MARKS))},
         )
         while True:
             try:

@@ -21,6 +21,7 @@ from fieldcal.run.wait_reason import WaitState
 from fieldcal.run.waiting import PositionWait
 from fieldcal.session import description_file
 from fieldcal.session.folder import Session
+from fieldcal.session.marks import insisted_positions
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.in_process import InProcess
@@ -198,6 +199,37 @@ def test_nobody_insists_on_a_place_that_is_right_by_now(
     assert turner.told[-1] == "not yet: settling"
     marks = Session.open(tmp_path / "s").marks()
     assert "insisted" not in [mark["event"] for mark in marks]
+
+
+class Stubborn(Turner):
+    """Sets one position wrong, and takes it like this."""
+
+    def wish(self) -> Wish | None:
+        state = self.views[-1].reason.state if self.views else WaitState.NOTHING
+        return "confirm" if state is WaitState.MISPLACED else None
+
+
+@pytest.mark.parametrize("then", [22.5, 30.0])
+@pytest.mark.parametrize("resumed", [False, True])
+def test_a_wrong_position_that_was_insisted_on_is_no_measure_of_the_next(
+    tmp_path: Path, then: float, resumed: bool
+) -> None:
+    """The next one may be right by those before, or go on as the mount has slipped."""
+    turner = Stubborn(InProcess(VirtualDevice(seed=3)))
+    turner.slips, turner.corrects = [(0.0, 0.0), (30.0, 0.0), (then, 2.5)], False
+    three, taken, insisted = FIVE_POSITIONS[:3], dict[int, Average](), set[int]()
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        engine = Engine(turner.driver, turner, ABOUT, recorder, 60.0, taken,
+                        insisted=insisted)  # fmt: skip
+        if resumed:
+            engine.run(hold_all(three[:2], 5.0))
+            assert insisted == {1} and list(taken) == [0, 1]
+            engine = Engine(turner.driver, turner, ABOUT, recorder, 60.0, taken,
+                            insisted=insisted)  # fmt: skip
+        engine.run(hold_all(three, 5.0))
+    marks = list(Session.open(tmp_path / "s").marks())
+    assert list(insisted_positions(marks)) == [1] and insisted == {1}
+    assert [m["position"] for m in marks if m["event"] == "window"] == [0, 1, 2]
 
 
 def test_an_operator_may_stop(bench: Bench) -> None:

@@ -205,11 +205,12 @@ class SessionRun:
             for number in remedy["again"]:
                 self._wanted_again = int(number)
                 yield Repeat(number)
-            for place in remedy["positions"]:
+            places, seconds = remedy["positions"], remedy["seconds"]
+            for behind, place in zip(range(len(places))[::-1], places, strict=True):
                 one = Position.deg(place["alpha_deg"], place["beta_deg"])
-                number = yield from add(one, remedy["seconds"])
+                number = yield from add(one, seconds)
                 try:
-                    yield from hold_until_still(number, one, remedy["seconds"], None)
+                    yield from hold_until_still(number, one, seconds, None, behind)
                 except Skipped as skipped:
                     yield from note(str(skipped))
                     return

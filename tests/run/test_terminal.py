@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 from terminal_screens import HOLD, MISPLACED, SCREENS, screen, sized, view
 
-from fieldcal.core.positions import FIVE_POSITIONS
+from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator import terminal
@@ -167,6 +167,18 @@ def test_a_link_that_is_silent_is_said_large_and_for_as_long_as_it_is(
     assert "N O   S A M P L E S" in said and "! no samples come from ttyUSB0" in said
     operator.show(view("turning"))
     assert "S A M P L E S" not in screen(operator)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (40, 15)])
+def test_positions_that_a_remedy_adds_are_counted_from_the_first(
+    size: tuple[int, int],
+) -> None:
+    """Of three more, the first is not the last."""
+    operator = sized(*size)
+    operator.place(Hold(5, Position.deg(-45.0, 5.0), 9.0, further=2))
+    shown = screen(operator, *size)
+    assert ("position 6 of 8" if size == (80, 24) else "6/8") in shown
+    assert size == (80, 24) or "to come 1 2 3 4 5 7 8" in " ".join(shown.split())
 
 
 def test_a_lost_device_is_said_once_and_what_was_told_survives_what_is_done() -> None:

@@ -101,6 +101,13 @@ class RunContent:
         return self.view.phase if self.view else ""
 
     @property
+    def count(self) -> int:
+        """Number of positions, with those that are known to follow."""
+        known = len(self.positions)
+        hold = self.hold
+        return known if hold is None else max(known, hold.index + 1 + hold.further)
+
+    @property
     def current_index(self) -> int:
         """Number of the position asked for, from 0; -1 before there is one."""
         return self.hold.index if self.hold else -1
@@ -108,7 +115,7 @@ class RunContent:
     @property
     def instruction(self) -> Instruction:
         """The present instruction."""
-        number = position_label(self.hold, len(self.positions), self.most)
+        number = position_label(self.hold, self.count, self.most)
         return Instruction.of(self.hold, self.view, number, self.worked)
 
     @property

@@ -118,6 +118,7 @@ class Driver(ABC):
     name: str
     health: LinkHealth
     on_silence: Callable[[], None] | None = None
+    _first_heard: Block | None = None
 
     @abstractmethod
     def __init__(self, address: str) -> None: ...
@@ -190,6 +191,20 @@ class Driver(ABC):
             elif monotonic() >= deadline:
                 raise DeviceSilent(self._silence(timeout, before))
 
+    def speaks(self, timeout: float) -> bool:
+        """Whether a sample comes within `timeout` s; it is the first of `blocks`.
+
+        Raises
+        ------
+        DeviceError
+            If the link fails.
+
+        """
+        if self._first_heard is None:
+            block = self._receive(timeout)
+            self._first_heard = block if block is not None and len(block) else None
+        return self._first_heard is not None
+
     def why_silent(self, before: LinkHealth) -> str:
         """Why no sample came since the link did like `before`, and what to do."""
         now = self.health
@@ -225,6 +240,9 @@ class Driver(ABC):
         return "bytes come, but none that this format knows; check format and baud rate"
 
     def _receive(self, timeout: float) -> Block | None:
+        if self._first_heard is not None:
+            heard, self._first_heard = self._first_heard, None
+            return heard
         try:
             return self.receive(timeout)
         except self.faults as fault:

@@ -76,22 +76,31 @@ def main(argv: Sequence[str] | None = None) -> int:
     # small matrices by the thousand: threads would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     use_spellings()
-    with _escaped_output():
+    with _standard_streams():
         return _run_named_command(argv)
 
 
 @contextlib.contextmanager
-def _escaped_output() -> Iterator[None]:
-    """Make both streams show control characters in foreign text, not send them."""
+def _standard_streams() -> Iterator[None]:
+    """Make both outputs show control characters in foreign text, not send them.
+
+    A stream that was closed, or that a program without a console lacks, is nowhere.
+    """
     from fieldcal.core.escaping import EscapingStream
 
-    before = sys.stdout, sys.stderr
-    if all(before):  # a program without a console has none
-        sys.stdout, sys.stderr = (cast(TextIO, EscapingStream(s)) for s in before)
-    try:
-        yield
-    finally:
-        sys.stdout, sys.stderr = before
+    before = sys.stdin, sys.stdout, sys.stderr
+    with contextlib.ExitStack() as opened:
+        # in this order: what is opened first takes the number of a closed one
+        given, *outputs = (
+            stream or opened.enter_context(open(os.devnull, mode, encoding="utf-8"))
+            for stream, mode in zip(before, "rww", strict=True)
+        )
+        sys.stdin = given
+        sys.stdout, sys.stderr = (cast(TextIO, EscapingStream(s)) for s in outputs)
+        try:
+            yield
+        finally:
+            sys.stdin, sys.stdout, sys.stderr = before
 
 
 def _run_named_command(argv: Sequence[str] | None) -> int:
@@ -113,7 +122,8 @@ def _run_guarded(name: str, arguments: list[str]) -> int:
     try:
         parser = _command_parser(name, command)
         code = command.run(parser.parse_args(parser.with_lists(arguments)))
-        return _flush_output(code)
+        sys.stdout.flush()
+        return code
     except FieldcalError as error:
         said, code, printed = (
             escape_line(str(error)),
@@ -122,9 +132,6 @@ def _run_guarded(name: str, arguments: list[str]) -> int:
         )
     except KeyboardInterrupt:
         said, code = "interrupted", EXIT_INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 0
     except Exception as error:  # the operator gets a sentence whatever it is
         if full := _output_is_full(error):
             said, code = full, FieldcalError.exit_code
@@ -146,20 +153,9 @@ def _write_failure(said: str, code: int) -> None:
         sys.stdout.write(json.dumps(failed, ensure_ascii=False) + "\n")
         sys.stdout.flush()
     except OSError:
-        from fieldcal.commands.console import discard_output
+        from fieldcal.core.escaping import discard_output
 
-        discard_output()
-
-
-def _flush_output(code: int) -> int:
-    """Flush standard output, which may have no reader any more; return the code."""
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        from fieldcal.commands.console import discard_output
-
-        discard_output()
-    return code
+        discard_output(sys.stdout)
 
 
 def _output_is_full(error: Exception) -> str:
@@ -171,10 +167,10 @@ def _output_is_full(error: Exception) -> str:
     # an error of a named file is one of a file, and no stream's
     if not isinstance(error, OSError) or error.filename or error.errno not in full:
         return ""
-    from fieldcal.commands.console import discard_output
     from fieldcal.core.errors import disk_says
+    from fieldcal.core.escaping import discard_output
 
-    discard_output()
+    discard_output(sys.stdout)
     return f"the output cannot be written: {disk_says(error)}"
 
 

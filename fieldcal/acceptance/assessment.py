@@ -24,7 +24,7 @@ from fieldcal.acceptance.family_at_temperature import (
 from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.acceptance.mean_removal import removed_bias_sentences
 from fieldcal.acceptance.run_facts import (
-    insisted_positions,
+    insistence_doubts,
     link_counts,
     restart_warnings,
 )
@@ -85,7 +85,7 @@ def assess(
         family=earlier.family.calibrations if earlier.family else None,
         temperature_sigma=earlier.family.sigma if earlier.family else {},
         doubts=[
-            *insisted_positions(marks),
+            *insistence_doubts(marks),
             *broken_axis_messages(session.block.six),
             *_removed_biases(calibration, session, windows, limits),
         ],

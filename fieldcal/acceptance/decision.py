@@ -150,10 +150,13 @@ def _find_remedy(
 ) -> Remedy | None:
     """The cheapest remedy; None if it cannot be predicted from the windows.
 
-    More positions of the same fixture do not check its angles.
+    More positions of the same fixture do not check its angles, nor do they make a
+    wrong description right.
     """
     windows = circumstances.windows
-    if not windows or any(c.name == ANGLES and c.ok is False for c in checks):
+    if not windows or calibration.info.get("misdescribed"):
+        return None
+    if any(c.name == ANGLES and c.ok is False for c in checks):
         return None
     known = [w.sigma[:3][np.isfinite(w.sigma[:3])] for w in windows]
     sigma = float(np.median([s.max() for s in known if len(s)] or [np.nan]))

@@ -12,6 +12,7 @@ import numpy as np
 
 from fieldcal.core.sampling import shows_losses
 from fieldcal.session.folder import Session
+from fieldcal.session.marks import insisted_positions
 from fieldcal.windows import Average
 
 
@@ -40,20 +41,11 @@ def link_counts(
     return counts | ({"missing": missing} if shown else {})
 
 
-def insisted_positions(marks: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Positions that the operator confirmed although they looked wrong."""
-    insisted: dict[int, str] = {}
-    for mark in marks:
-        number = mark.get("position")
-        if not isinstance(number, int):
-            continue
-        if mark.get("event") == "asked":
-            insisted.pop(number, None)
-        elif mark.get("event") == "insisted":
-            insisted[number] = str(mark.get("text", ""))
+def insistence_doubts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Sentences about positions that were accepted although they looked wrong."""
     return [
         f"position {number + 1} was accepted by the operator although {text}"
-        for number, text in sorted(insisted.items())
+        for number, text in sorted(insisted_positions(marks).items())
     ]
 
 

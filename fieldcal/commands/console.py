@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterable
 from typing import IO, Any
@@ -14,7 +13,7 @@ from rich.text import Text
 
 from fieldcal.commands.row_lists import as_row_lists, cuts_cells
 from fieldcal.commands.spelling import spell
-from fieldcal.core.escaping import escape_invisible
+from fieldcal.core.escaping import discard_output, escape_invisible
 
 
 class EscapingConsole(Console):
@@ -85,11 +84,4 @@ class EscapingConsole(Console):
     def on_broken_pipe(self) -> None:
         """Continue without output, so that the exit code is still right."""
         self.quiet = True
-        discard_output()
-
-
-def discard_output() -> None:
-    """Redirect standard output to nowhere, since its reader is gone."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
+        discard_output(self.file)

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from fieldcal.acceptance.uncertainty import UNCERTAINTY
 from fieldcal.calibration import Calibration
+
+if TYPE_CHECKING:
+    from fieldcal.session.description import Description
 
 GO = "GO: within all limits that could be checked"
 NO_GO = "NO-GO: do not launch on this, for the reasons marked NO"
@@ -19,7 +24,8 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
 
     The decision comes last, with its reasons just above it, so that both are on the
     screen at the end. After a NO-GO follow the cheapest remedy, or the positions that
-    were left out. `folder` is the session of a run, in which they can be taken.
+    were left out, and what was not stated. `folder` is the session of a run, in which
+    they can be taken.
     """
     from fieldcal.commands.console import EscapingConsole
     from fieldcal.commands.table import print_sentence
@@ -41,7 +47,8 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
     if remedy:
         print_sentence(console, "to GO: ", remedy["says"])
     if folder is not None and not decision["go"]:
-        _print_resume_command(folder, remedy)
+        failed = {check["name"] for check in decision["checks"] if check["ok"] is False}
+        _print_resume_commands(folder, remedy, failed)
 
 
 def reasons_against(found: Calibration) -> list[str]:
@@ -54,23 +61,48 @@ def reasons_against(found: Calibration) -> list[str]:
     return []
 
 
-def _print_resume_command(folder: Path, remedy: dict[str, Any] | None) -> None:
-    """Print the command that takes the remedy or the positions that were left out."""
+def _print_resume_commands(
+    folder: Path, remedy: dict[str, Any] | None, failed: Collection[str]
+) -> None:
+    """Print the commands that state what nobody stated, and take what is lacking."""
     from fieldcal.commands.console import EscapingConsole
     from fieldcal.commands.table import print_sentence
     from fieldcal.run.resuming import positions_left_out
     from fieldcal.session.folder import Session
 
-    console = EscapingConsole()
+    console, session = EscapingConsole(), Session.open(folder)
     call = f"fieldcal run --resume {shlex.quote(str(folder))}"
     if remedy:
         print_sentence(console, "       ", f"{call} takes it")
-    elif left_out := positions_left_out(Session.open(folder)):
+    elif left_out := positions_left_out(session):
         which = ", ".join(str(i + 1) for i in left_out)
         what = "positions" if len(left_out) > 1 else "position"
         print_sentence(
             console, "first: ", f"take {what} {which}, left out so far: {call}"
         )
+    if unsaid := _options_unsaid(session.about, failed):
+        said = f"state what nobody stated, and it is judged anew: {call} "
+        said += " ".join(unsaid)
+        print_sentence(console, "first: ", said)
+
+
+def _options_unsaid(about: Description, failed: Collection[str]) -> list[str]:
+    """Options of `run --resume` that state what failed checks lack."""
+    from fieldcal.acceptance.angles import ANGLES, unstated_angles_warning
+    from fieldcal.acceptance.site import (
+        gravity_missing_warning,
+        latitude_missing_warning,
+    )
+
+    options = []
+    if gravity_missing_warning(about) or latitude_missing_warning(about):
+        options += ["--latitude DEG --height M"] * ("site" in failed)
+    if about.level_deg is None:
+        options += ["--level DEG"] * ("level" in failed)
+    if unstated_angles_warning(about):
+        by_angles = {ANGLES, *(f"acc_{of}{UNCERTAINTY}" for of in ("bias", "scale"))}
+        options += ["--angles DEG"] * bool(by_angles & {*failed})
+    return options
 
 
 def _growth_sentence(growth: dict[str, Any]) -> str:

@@ -55,7 +55,8 @@ def find_device(args: argparse.Namespace, mounted: bool = False) -> None:
     url = found.url
     gravity = args.gravity or DEFAULT_GRAVITY
     with _open_device(url) as driver:
-        known = introduce_device(_first_samples(driver), gravity)
+        first, stated = _first_samples(driver), bool(driver.notes.get("installed"))
+        known = introduce_device(first, gravity, stated)
         asks = not args.headless and sys.stdin.isatty()
         if asks and TEXT_FORMAT in url and "gx" in url and "gyr_unit" not in url:
             _print_line("turn the device by hand by 45° or more, and put it back ...")
@@ -69,10 +70,32 @@ def find_device(args: argparse.Namespace, mounted: bool = False) -> None:
     _print_line(f"{found.says.partition(';')[0]}; {known.summary}")
     _print_line(f"the next time: {line}")
     if asks:
-        _print_line("Enter takes it, q ends: ", end="")
-        if sys.stdin.readline().strip().lower().startswith("q"):
-            raise Stopped("stopped by the operator")
+        _ask_to_take_it()
     args.device = url
+
+
+def _ask_to_take_it() -> None:
+    """Ask whether the device is the right one, until the answer is clear.
+
+    What was typed before the question is no answer to it.
+
+    Raises
+    ------
+    Stopped
+        If it is not, or if nobody can answer any more.
+
+    """
+    from fieldcal.run.operator.keyboard import forget_typed_lines
+
+    forget_typed_lines()
+    while True:
+        _print_line("Enter takes it, q ends: ", end="")
+        line = sys.stdin.readline()
+        answer = line.strip().lower()
+        if not line or answer in ("q", "quit", "n", "no"):
+            raise Stopped("stopped by the operator")
+        if answer in ("", "y", "yes"):
+            return
 
 
 def _only_answering_device() -> DetectedDevice:

@@ -179,6 +179,8 @@ def tell_failure(arguments: Sequence[str], said: str, code: int) -> bool:
 
 
 def _prepare_and_run(args: argparse.Namespace) -> int:
+    from fieldcal.session.lock import refuse_in_use
+
     if args.resume:
         folder = session_to_resume(args.resume)
         if write_statements(args, folder):
@@ -187,6 +189,7 @@ def _prepare_and_run(args: argparse.Namespace) -> int:
                 return code
     task, folder = make_task(args)
     if not task.run.get("device") and task.mover["kind"] != "virtual":
+        refuse_in_use(folder)
         find_device(args, _plan_states_mounting(args, task))
         task, folder = make_task(args)
     with serve_page(args) as page:

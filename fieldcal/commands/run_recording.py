@@ -44,8 +44,10 @@ def record_and_solve(
     from fieldcal.run.retrying_mover import RetryingMover
     from fieldcal.run.session_run import SessionRun
     from fieldcal.session.folder import Session
+    from fieldcal.session.lock import refuse_in_use
     from fieldcal.session.recorder import Recorder
 
+    refuse_in_use(folder)  # before its device, which that run has open
     with device_and_mover(task) as (opened, mover), contextlib.ExitStack() as stack:
         driver = opened()
         stack.callback(driver.close)

@@ -10,6 +10,7 @@ So invisible characters are replaced by their numbers.
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
 from collections.abc import Iterable
@@ -50,8 +51,18 @@ def _number(match: re.Match[str]) -> str:
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
 
+def discard_output(stream: IO[str]) -> None:
+    """Redirect what a stream still has, and all to come, to nowhere."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
 class EscapingStream:
     """Output stream that escapes invisible characters.
+
+    If its reader goes, the rest is discarded: a command goes on, and its exit code is
+    what it finds.
 
     Parameters
     ----------
@@ -65,7 +76,18 @@ class EscapingStream:
 
     def write(self, text: str) -> int:
         """Write text as `escape_invisible` returns it."""
-        return self.rich_proxied_file.write(escape_invisible(text))
+        try:
+            return self.rich_proxied_file.write(escape_invisible(text))
+        except BrokenPipeError:
+            discard_output(self.rich_proxied_file)
+            return len(text)
+
+    def flush(self) -> None:
+        """Flush what was written."""
+        try:
+            self.rich_proxied_file.flush()
+        except BrokenPipeError:
+            discard_output(self.rich_proxied_file)
 
     def writelines(self, lines: Iterable[str]) -> None:
         """Write several lines."""

@@ -178,11 +178,15 @@ def _shift_sigmas(
 def with_description_faults(
     prepared: PreparedRecording, calibration: Calibration
 ) -> Calibration:
-    """The calibration, marked as bad if session.toml is found to be wrong."""
-    sentences = []
+    """The calibration, marked as bad if session.toml is found to be wrong.
+
+    Its `info` names what about: no further position makes it right.
+    """
+    sentences, wrong = [], []
     for name, fault in prepared.checked.faults:
         effect = catalogue()[name]
         if isinstance(effect, Chain) and effect.misread:
+            wrong.append(name)
             values = ", ".join(f"{k} = {v}" for k, v in fault.values.items())
             mended = fault.mended is not None
             mend = "mend it and solve again"
@@ -200,7 +204,8 @@ def with_description_faults(
     if not sentences:
         return calibration
     warnings = (*sentences, *calibration.warnings)
-    return replace(calibration, warnings=warnings, good=False)
+    info = {**calibration.info, "misdescribed": wrong}
+    return replace(calibration, warnings=warnings, info=info, good=False)
 
 
 def with_impossible_scales(

@@ -64,12 +64,16 @@ def with_skipped_positions(
 
 
 def hold_until_still(
-    index: int, position: Position, seconds: float, sigma: float | None
+    index: int,
+    position: Position,
+    seconds: float,
+    sigma: float | None,
+    further: int = 0,
 ) -> Plan[Average]:
     """Hold one position until a window was not disturbed."""
     for _ in range(MAX_TRIES):
         try:
-            return (yield from hold(index, position, seconds, sigma))
+            return (yield from hold(index, position, seconds, sigma, further))
         except Moved as moved:
             yield from note(f"{moved}; hold still, the window starts again")
     raise CalibrationFailed(

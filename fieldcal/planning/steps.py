@@ -28,6 +28,7 @@ class Hold:
     position : the position
     seconds : window length, s of device time
     sigma : stop earlier once each accelerometer mean is this well known, m/s^2
+    further : positions that are asked for behind it, of those not known from the start
 
     """
 
@@ -35,6 +36,7 @@ class Hold:
     position: Position
     seconds: float
     sigma: float | None = None
+    further: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,10 +92,14 @@ Plan = Generator[Step, Any, R]
 
 
 def hold(
-    index: int, position: Position, seconds: float, sigma: float | None = None
+    index: int,
+    position: Position,
+    seconds: float,
+    sigma: float | None = None,
+    further: int = 0,
 ) -> Plan[Average]:
     """Yield a `Hold`; the reply is its average."""
-    reply: Average = yield Hold(index, position, seconds, sigma)
+    reply: Average = yield Hold(index, position, seconds, sigma, further)
     return reply
 
 

@@ -44,6 +44,7 @@ from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait, measured_force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.run.window_taking import WindowTaker
+from fieldcal.run.zero_rates_watch import ZeroRatesWatch
 from fieldcal.session.description import Description
 from fieldcal.session.marks import POSITION_ADDED
 from fieldcal.session.position_tables import position_table
@@ -73,6 +74,8 @@ class Engine:
     added : positions of the session beyond the planned ones; new ones are appended
     left_out : numbers of positions that the operator has left out, which are not asked
         for again; new ones are added
+    insisted : numbers of positions that were taken although they looked wrong; new ones
+        are added
 
     """
 
@@ -89,6 +92,7 @@ class Engine:
         judge: Callable[[bool], object] = lambda quick: None,
         added: list[Position] | None = None,
         left_out: set[int] | None = None,
+        insisted: set[int] | None = None,
     ) -> None:
         self._driver = driver
         self._operator = operator
@@ -100,12 +104,16 @@ class Engine:
         self._judge = judge
         self._added = [] if added is None else added
         self._left_out = set[int]() if left_out is None else left_out
+        self._insisted = set[int]() if insisted is None else insisted
         self._held: AcceptedPosition | None = None
+        self._doubted: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
         self._before: int | None = None
         self._restarts = driver.health.restarts
         self._units = GyroUnitWatch(about.gravity)
         self._mixed = MixedDevicesWatch()
+        stated = bool(driver.notes.get("installed"))
+        self._zero_rates = ZeroRatesWatch(about.grade, stated)
         self._warned = set[tuple[int, str]]()
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver, self._left_out)
@@ -135,7 +143,7 @@ class Engine:
         reply: object = None
         error: FieldcalError | None = None
         if self._before not in self._taken:  # discarded: others are not judged by it
-            self._held = self._before = None
+            self._held = self._doubted = self._before = None
         try:
             while True:
                 step = plan.throw(error) if error else plan.send(reply)
@@ -161,7 +169,7 @@ class Engine:
                     self._display.show_taken_before(step, average)
                 if step.position.oriented:
                     f = measured_force(average.mean[None, :3], self._about)
-                    self._held = AcceptedPosition(step.position, f)
+                    self._note_reference(step.index, AcceptedPosition(step.position, f))
                 self._before = step.index
                 return average
             case Note(text):
@@ -174,6 +182,13 @@ class Engine:
                 return None
             case Judge(quick):
                 return self._judge(quick)
+
+    def _note_reference(self, index: int, here: AcceptedPosition) -> None:
+        """Note the position by which the next one is judged."""
+        if index in self._insisted:
+            self._doubted = here
+        else:
+            self._held, self._doubted = here, None
 
     def _add_position(self, step: Add) -> int:
         """Add a position to the session; returns its number."""
@@ -205,6 +220,7 @@ class Engine:
         while True:
             name = hold.position.name
             self._recorder.mark("asked", position=hold.index, name=name)
+            self._insisted.discard(hold.index)
             self._operator.place(hold)
             try:
                 average = self._average_position(hold)
@@ -231,6 +247,7 @@ class Engine:
             try:
                 average = self._windows.average(hold, pieces)
                 if average is not None:
+                    self._zero_rates.add_window(average)
                     self._warn_if_warming_up()
                     self._warned.clear()  # what was said of a turn is gone
                     self._warn_of_samples(hold)
@@ -269,7 +286,9 @@ class Engine:
     def _wait_for_arrival(self, hold: Hold) -> None:
         """Wait until the device rests where it should."""
         left = self._windows.disturbed_index == hold.index
-        waiting = PositionWait(hold, self._about, self._held, left, self._units)
+        waiting = PositionWait(
+            hold, self._about, self._held, left, self._units, self._doubted
+        )
         asked = self._driver.host_time()
         insisted = warned = False
         shown = WaitState.NOTHING
@@ -291,6 +310,7 @@ class Engine:
             elif wish == "confirm" and not waiting.arrived:
                 if insisted:
                     self._desk.record_insistence(hold, waiting.problem)
+                    self._insisted.add(hold.index)
                     return
                 insisted = self._desk.ask_back(waiting)
             waits = self._warm_up is not None and self._warm_up.must_wait
@@ -299,6 +319,8 @@ class Engine:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.notice)
             self._display.show_turning(hold, waiting, reason)
             shown = reason.state
+            if waiting.arrived:
+                self._zero_rates.add_rest(waiting.rates_at_rest)
             self._warn_of_samples(hold)
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
@@ -310,7 +332,8 @@ class Engine:
 
     def _warn_of_samples(self, hold: Hold) -> None:
         """Say once a position what is wrong with the samples: a unit, two devices."""
-        for notice in (self._units.notice, self._mixed.notice):
+        watches = (self._units, self._mixed, self._zero_rates)
+        for notice in (watch.notice for watch in watches):
             if notice and (hold.index, notice) not in self._warned:
                 self._warned.add((hold.index, notice))
                 self._desk.tell(notice)
@@ -320,7 +343,7 @@ class Engine:
     ) -> None:
         """Report that the device rests in a wrong position, and finally give up."""
         if quiet:
-            waiting.restart_waiting()
+            waiting.discount_latest()
         elif (waited := waiting.alarm_due()) is not None:
             text = reminder(waited) + waiting.problem
             self._recorder.mark("wrong", position=hold.index, text=text)

@@ -25,8 +25,9 @@ ZERO_SIGMAS = 3.0
 """Rates at rest within so many standard errors of zero are taken as without bias."""
 
 ZEROED_NOTICE = (
-    "; its rates are zero at rest: it takes their bias out itself; switch that off"
-    " (gyro bias estimation, zero velocity update), or the result is NO-GO"
+    "the rates are zero at rest: if the device takes their bias out itself (gyro bias"
+    " estimation, zero velocity update), switch that off, as a bias that is taken out"
+    " cannot be measured"
 )
 """Notice about rates without a bias."""
 
@@ -42,7 +43,7 @@ class DeviceIntroduction:
     ----------
     up : device axis that is up, as in "+z"; empty if none is, or if it reads no gravity
     mounting : mounting with which the device is at home; the plain one by default
-    rates_zeroed : whether its rates are zero at rest
+    rates_zeroed : whether its rates are zero at rest, for no reason that it states
     summary : one sentence about all of them
 
     """
@@ -53,17 +54,20 @@ class DeviceIntroduction:
     summary: str
 
 
-def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
+def introduce_device(
+    block: Block, gravity: float, bias_stated: bool = False
+) -> DeviceIntroduction:
     """Determine the properties of a device from samples at rest.
 
     Parameters
     ----------
     block : a second or more, SI, device axes
     gravity : m/s^2
+    bias_stated : whether the device states what it takes out, so that it is put back
 
     """
-    centred = _rates_are_zero(block.gyr)
-    zero = ZEROED_NOTICE * centred
+    centred = not bias_stated and rates_are_zero(block.gyr)
+    zero = f"; {ZEROED_NOTICE}" * centred
     if not np.isfinite(block.acc).any(axis=0).all():
         summary = "it sends no accelerations along all three axes"
         return DeviceIntroduction("", PLAIN_MOUNTING, centred, summary + zero)
@@ -79,16 +83,15 @@ def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
     return DeviceIntroduction(up, mounting, centred, f"{up} is up{zero}")
 
 
-def _rates_are_zero(gyr: Array) -> bool:
+def rates_are_zero(gyr: Array) -> bool:
     """Whether rates (n, 3) at rest are zero on each axis, by their own noise."""
     known = gyr[np.isfinite(gyr).all(axis=1)]
     if len(known) < 2:
         return False
     noise = np.diff(known, axis=0).std(axis=0) / np.sqrt(2)
     error = noise / np.sqrt(len(known))
-    return bool(
-        (noise > 0).all() and (np.abs(known.mean(axis=0)) < ZERO_SIGMAS * error).all()
-    )
+    # of one that sends nothing but zeros at rest both are zero
+    return bool((np.abs(known.mean(axis=0)) <= ZERO_SIGMAS * error).all())
 
 
 def rate_unit_from_turn(

@@ -8,8 +8,7 @@ run is resumed in the same way after a second and after a reboot.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from time import monotonic, sleep
+from time import monotonic
 from typing import Any
 
 from fieldcal import procedures
@@ -18,11 +17,9 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import (
     DeviceError,
-    LinkLost,
     MoverFailed,
     RecordingEnded,
     Skipped,
-    Stopped,
 )
 from fieldcal.core.positions import Position
 from fieldcal.drivers.driver import Driver
@@ -35,17 +32,20 @@ from fieldcal.run.interruptions import RepeatPosition
 from fieldcal.run.judging import judge_session
 from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, PlanTask
+from fieldcal.run.reconnection import Reconnection
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description_file import with_added_positions
-from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
+from fieldcal.session.marks import (
+    MARKS,
+    POSITION_ADDED,
+    insisted_positions,
+    read_marks,
+)
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average
 
 MOST_REMEDIES = 3
 """Most remedies of a NO-GO in one run."""
-
-RETRY_S = 0.5
-"""Time between two attempts to open the device again, s."""
 
 
 class SessionRun:
@@ -113,7 +113,8 @@ class SessionRun:
                     raise  # it never said anything: nothing to wait for
                 # what befalls a device that has not come back since is no news
                 since, first = self._lost
-                driver = self._wait_for_device(first, since + self._patience)
+                back = Reconnection(self._opened, self._operator, self._recorder)
+                driver = back.wait(first, since + self._patience)
 
     def _run_with_device(self, driver: Driver) -> Calibration:
         recorder, task = self._recorder, self._task
@@ -133,6 +134,7 @@ class SessionRun:
             self._judge,
             self._added,
             self._left_out,
+            {*insisted_positions(read_marks(recorder.folder / MARKS))},
         )
         while True:
             try:
@@ -203,11 +205,12 @@ class SessionRun:
             for number in remedy["again"]:
                 self._wanted_again = int(number)
                 yield Repeat(number)
-            for place in remedy["positions"]:
+            places, seconds = remedy["positions"], remedy["seconds"]
+            for behind, place in zip(range(len(places))[::-1], places, strict=True):
                 one = Position.deg(place["alpha_deg"], place["beta_deg"])
-                number = yield from add(one, remedy["seconds"])
+                number = yield from add(one, seconds)
                 try:
-                    yield from hold_until_still(number, one, remedy["seconds"], None)
+                    yield from hold_until_still(number, one, seconds, None, behind)
                 except Skipped as skipped:
                     yield from note(str(skipped))
                     return
@@ -218,23 +221,3 @@ class SessionRun:
         out = {known[i].degrees for i in self._left_out if i < len(known)}
         wanted = {Position.deg(p["alpha_deg"], p["beta_deg"]).degrees for p in places}
         return bool(wanted & out)
-
-    def _wait_for_device(self, lost: DeviceError, deadline: float) -> Driver:
-        """Open the device again, or raise the error by which it was lost."""
-        self._recorder.mark("lost", text=str(lost))
-        left = deadline - monotonic()
-        if left > 0:
-            said = lost.fault if isinstance(lost, LinkLost) else str(lost)
-            self._operator.tell(
-                f"{said}; goes on by itself once it is back, within {left:.0f} s; if"
-                " it has another port now (fieldcal ports), end this (q), resume there"
-            )
-        while monotonic() < deadline:
-            with suppress(DeviceError):
-                driver = self._opened()
-                self._recorder.link_reopened()
-                return driver
-            if self._operator.wish() == "stop":
-                raise Stopped("stopped by the operator")
-            sleep(RETRY_S)
-        raise lost

@@ -61,6 +61,7 @@ class PositionWait:
     previous : the position that was accepted before, if any
     interrupted : whether a motion has just broken off a window in this position
     units : determines the gyroscopes' unit
+    doubted : a later position that was accepted although it looked wrong
 
     Attributes
     ----------
@@ -68,7 +69,8 @@ class PositionWait:
     arrival : where the device rests, None while it moves
     where : where it is, also while it moves; None while that is unknown
     f : (3,) specific force at rest, procedure axes, m/s^2; None while it moves
-    waited : s of samples since it was asked for, by the device's clock
+    waited : s of samples since it was asked for, by the device's clock, in which nobody
+        was turning it
     waited_host : the same by the host's clock
 
     """
@@ -80,17 +82,19 @@ class PositionWait:
         previous: AcceptedPosition | None,
         interrupted: bool = False,
         units: GyroUnitWatch | None = None,
+        doubted: AcceptedPosition | None = None,
     ) -> None:
         self._hold, self._about = hold, about
         self._previous, self._interrupted = previous, interrupted
+        self._doubted = doubted
         self._units = units
         self._address = str(about.raw.get("run", {}).get("device", ""))
         self._others = _other_positions(hold, about)
-        self._began: float | None = None
         self._first: Array | None = None
         self._turned = False
         self._start()
         self._last = self._last_host = self._stirred = np.nan
+        self._latest = self._latest_host = 0.0
         self.waited = self.waited_host = 0.0
 
     def _start(self) -> None:
@@ -124,16 +128,17 @@ class PositionWait:
             If an axis of the accelerometers gives no value, also at rest.
 
         """
-        if self._last_host < host:
-            self.waited_host += min(MAX_GAP_S, host - self._last_host)
+        since = self._last_host if self._last_host < host else host
+        self._latest_host = min(MAX_GAP_S, host - since)
         self._last_host = host
-        away = float(block.t[0]) - self._last
-        if away > MAX_GAP_S:
+        gap = float(block.t[0]) - self._last > MAX_GAP_S
+        if gap:
             self._start()
-            self._began = None if self._began is None else self._began + away
+        began = float(block.t[0]) if gap or np.isnan(self._last) else self._last
         self._last = float(block.t[-1])
-        self._began = float(block.t[0]) if self._began is None else self._began
-        self.waited = self._last - self._began
+        self._latest = self._last - began
+        self.waited += self._latest
+        self.waited_host += self._latest_host
         self._stillness.add(block)
         self._resting.add(block, self._stillness.since)
         if self._stillness.since is not None or np.isnan(self._stirred):
@@ -168,8 +173,23 @@ class PositionWait:
             )
 
     def _check_position(self, f: Array) -> PositionCheck:
+        """Compare a force with the position, by the change since an earlier one.
+
+        Where the operator insisted, either the device stood wrong or the check was
+        wrong, as if its mount had slipped: this position may go by either.
+        """
         wanted, g = self._hold.position, self._about.gravity
-        return check_position(wanted, f, g, self._previous, self._others, self._address)
+        known, address = self._others, self._address
+        check = check_position(wanted, f, g, self._previous, known, address)
+        if check.ok or self._doubted is None:
+            return check
+        other = check_position(wanted, f, g, self._doubted, known, address)
+        return other if other.ok else check
+
+    @property
+    def rates_at_rest(self) -> Array:
+        """Rates of the last second at rest, (n, 3) rad/s; none while it moves."""
+        return self._resting.block.gyr if self.seconds > 0 else np.zeros((0, 3))
 
     @property
     def arrived(self) -> bool:
@@ -232,10 +252,15 @@ class PositionWait:
         problem = self.arrival.problem if self.arrival else ""
         return said and f"{said}; else {problem}"
 
-    def restart_waiting(self) -> None:
-        """Restart the waiting time, while the device is still being turned."""
-        self._began = self._last
-        self.waited = self.waited_host = 0.0
+    def discount_latest(self) -> None:
+        """Do not count the latest block as waiting: the device is still being turned.
+
+        What was waited before counts: a mover that is told once more, and turns nothing
+        again, must not be waited for without end.
+        """
+        self.waited -= self._latest
+        self.waited_host -= self._latest_host
+        self._latest = self._latest_host = 0.0
 
     def has_waited_enough(self, give_up: float) -> bool:
         """Whether the wait exceeds `give_up` s by device and by host time."""
@@ -251,11 +276,11 @@ class PositionWait:
         if self.reason.state is not WaitState.MISPLACED or self.f is None:
             return None
         again = not self._has_moved_from(self._told_of)
-        if again and self._last - self._told < REMIND_EVERY_S:
+        if again and self.waited - self._told < REMIND_EVERY_S:
             return None
         if not self._turned and self.waited < UNTURNED_ALARM_S:
             return None
-        self._told, self._told_of = self._last, self.f
+        self._told, self._told_of = self.waited, self.f
         return self.waited if again else 0.0
 
     def _has_moved_from(self, place: Array | None) -> bool:

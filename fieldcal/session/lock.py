@@ -68,6 +68,22 @@ class SessionLock:
                 self._lock.release()
 
 
+def refuse_in_use(folder: Path) -> None:
+    """Refuse a session that another process records into; nothing is left behind.
+
+    Whether it can be written at all is for whoever writes it to find out.
+
+    Raises
+    ------
+    SessionInUse
+        If another process holds its lock.
+
+    """
+    if (folder / LOCK).exists():
+        with suppress(OSError):
+            SessionLock(folder).release()
+
+
 def _user() -> str:
     try:
         return getuser()

@@ -55,6 +55,20 @@ def taken_windows(marks: Iterable[Mapping[str, Any]]) -> dict[int, tuple[float, 
     return taken
 
 
+def insisted_positions(marks: Iterable[Mapping[str, Any]]) -> dict[int, str]:
+    """Positions that the operator accepted though they looked wrong, and what did."""
+    insisted: dict[int, str] = {}
+    for mark in marks:
+        number = mark.get("position")
+        if not isinstance(number, int):
+            continue
+        if mark.get("event") == "asked":
+            insisted.pop(number, None)
+        elif mark.get("event") == "insisted":
+            insisted[number] = str(mark.get("text", ""))
+    return insisted
+
+
 def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:
     """Marks with a correct checksum; none if there is no file.
 

@@ -95,7 +95,7 @@ def misspelt_keys(tables: Mapping[str, Any], *schemas: Mapping[str, Any]) -> lis
     known: dict[str, Any] = {}
     for schema in schemas:
         known |= schema.get("properties", {})
-    found = _misspelt(tables, known, [])
+    found = [*_misspelt(tables, known, []), *_misplaced(tables, known)]
     for name, inner in tables.items():
         form = known.get(name, {})
         many = isinstance(inner, list)
@@ -115,6 +115,26 @@ def _misspelt(
         near += get_close_matches(key, known, 1, NEARLY)
         if near and key not in known:
             found.append(f"{_key([*path, key])} is not known: write {near[0]}")
+    return found
+
+
+def _misplaced(tables: Mapping[str, Any], known: Mapping[str, Any]) -> list[str]:
+    """Sentences about keys above all tables that belong into one of them."""
+    inside = {
+        name: form.get("items", form).get("properties", {})
+        for name, form in known.items()
+    }
+    found = []
+    for key in (k for k, v in tables.items() if not isinstance(v, Mapping | list)):
+        homes = [
+            (table, name)
+            for table, names in inside.items()
+            for name in names
+            if name == key or name.startswith(f"{key}_")
+        ]
+        if key not in known and len(homes) == 1:
+            table, name = homes[0]
+            found.append(f"{key} belongs into a table: write {name} below [{table}]")
     return found
 
 

@@ -29,6 +29,7 @@ def decided(
     angles: list[tuple[float, float]],
     bounds: GradeLimits,
     without_gyroscopes: bool = False,
+    gyr_read: float = 1.0,
     **said: float,
 ) -> Calibration:
     """A session of a virtual device in these positions, solved and decided about."""
@@ -39,6 +40,7 @@ def decided(
     block = recorded(Profile(noise=QUIET), positions)
     if without_gyroscopes:
         block = replace(block, gyr=np.full_like(block.gyr, np.nan))
+    block = replace(block, gyr=gyr_read * block.gyr)
     site: dict[str, float] = {"latitude_deg": 50.45, "height_m": 170.0}
     site |= {"angle_setting_deg": 0.05, **said}
     session = Session.open(write_session(folder, block, positions, site=site))
@@ -84,6 +86,15 @@ def about(tmp_path: Path, angles: list[tuple[float, float]]) -> Session:
     text = tomlkit.dumps({"format": 1, "position": positions})
     (tmp_path / "session.toml").write_text(text)
     return Session.open(tmp_path)
+
+
+def test_no_position_is_asked_for_where_a_unit_is_wrong(tmp_path: Path) -> None:
+    """Rates in rad/s that are taken for deg/s: one position more cannot help."""
+    five = [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS]
+    found = decided(tmp_path / "s", five, LIMITS, gyr_read=float(np.deg2rad(1.0)))
+    decision = found.info["decision"]
+    assert "record it again with gyr_unit in the device's" in decision["reasons"][0]
+    assert found.info["misdescribed"] == ["mounting"] and "remedy" not in decision
 
 
 def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:

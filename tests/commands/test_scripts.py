@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -42,6 +43,39 @@ def test_a_reader_that_goes_changes_no_exit_code(
         code = solving.wait()
     assert code == whole == 0 and "BrokenPipe" not in said
     assert "method: five_position" in shown.out and not shown.err
+
+
+def test_a_reader_of_events_that_goes_ends_no_run(tmp_path: Path) -> None:
+    """As of `2> >(head -1)`: result and exit code are those of any other run."""
+    held = places([(0.0, 0.0), (45.0, 5.0)], seconds=6.0, gap=6.0)
+    recording = write_session(tmp_path / "s", recorded(Profile(), held), held)
+    call = [*FIELDCAL, "run", "two_position", "--headless", "--json", "--no-report"]
+    call += ["--device", f"replay:{recording}?speed=max", "--seconds", "3"]
+    with subprocess.Popen(
+        [*call, "-o", str(tmp_path / "r")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as running:
+        assert running.stdout and running.stderr
+        running.stderr.close()
+        told = json.loads(running.stdout.read())
+        code = running.wait()
+    assert code == (0 if told["decision"]["go"] else 1)
+
+
+@pytest.mark.parametrize("closed", [0, 1, 2])
+def test_a_stream_that_was_closed_changes_no_exit_code(
+    session: Path, closed: int
+) -> None:
+    """As of `>&-`, or of a service that has no console."""
+    call = [*FIELDCAL, "solve", str(session), "--as-printed"]
+    assert subprocess.run(
+        call, preexec_fn=lambda: os.close(closed), check=False
+    ).returncode == 0  # fmt: skip
+    call[-2] += "-nowhere"
+    assert subprocess.run(
+        [*call, "--json"], preexec_fn=lambda: os.close(closed), check=False
+    ).returncode == 2  # fmt: skip
 
 
 FULL = Path("/dev/full")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from engine_bench import ABOUT, Bench, Turner, events, hold_all
 
-from fieldcal.core.errors import Stopped
+from fieldcal.core.errors import Stopped, WrongPosition
 from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, add, hold
@@ -21,9 +21,11 @@ from fieldcal.run.wait_reason import WaitState
 from fieldcal.run.waiting import PositionWait
 from fieldcal.session import description_file
 from fieldcal.session.folder import Session
+from fieldcal.session.marks import insisted_positions
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.in_process import InProcess
+from fieldcal.sim_device.profile import Profile, Sampling
 from fieldcal.windows import Average
 
 
@@ -61,6 +63,31 @@ def test_nobody_gives_up_on_a_mover_that_is_at_work(tmp_path: Path) -> None:
     assert not turner.told
     marks = Session.open(tmp_path / "s").marks()
     assert [m["event"] for m in marks] == ["asked", "window", "asked", "window"]
+
+
+@pytest.mark.parametrize("works", [1.0, pytest.param(65.0, marks=pytest.mark.thorough)])
+def test_a_mover_that_turns_nothing_is_given_up(tmp_path: Path, works: float) -> None:
+    """A table without power says each time that it is done: told again after a minute,
+    it is at work for a while, which must not begin the wait anew."""
+
+    class Lame(Turner):
+        done = 0.0
+
+        def place(self, hold: Hold) -> None:
+            self.done = self.driver.device.time + works
+
+        def wish(self) -> Wish | None:
+            assert self.driver.device.time < 400.0
+            return "wait" if self.driver.device.time < self.done else None
+
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner = Lame(
+            InProcess(VirtualDevice(Profile(sampling=Sampling(rate_hz=20.0)), seed=3))
+        )
+        engine = Engine(turner.driver, turner, ABOUT, recorder, give_up=90.0)
+        with pytest.raises(WrongPosition, match=r"asked for is α = 45"):
+            engine.run(hold_all(TWO_POSITIONS[1:], 5.0))
+    assert sum("still waiting" in told for told in turner.told) == 1
 
 
 def test_what_was_taken_before_is_not_asked_for_again(bench: Bench) -> None:
@@ -172,6 +199,37 @@ def test_nobody_insists_on_a_place_that_is_right_by_now(
     assert turner.told[-1] == "not yet: settling"
     marks = Session.open(tmp_path / "s").marks()
     assert "insisted" not in [mark["event"] for mark in marks]
+
+
+class Stubborn(Turner):
+    """Sets one position wrong, and takes it like this."""
+
+    def wish(self) -> Wish | None:
+        state = self.views[-1].reason.state if self.views else WaitState.NOTHING
+        return "confirm" if state is WaitState.MISPLACED else None
+
+
+@pytest.mark.parametrize("then", [22.5, 30.0])
+@pytest.mark.parametrize("resumed", [False, True])
+def test_a_wrong_position_that_was_insisted_on_is_no_measure_of_the_next(
+    tmp_path: Path, then: float, resumed: bool
+) -> None:
+    """The next one may be right by those before, or go on as the mount has slipped."""
+    turner = Stubborn(InProcess(VirtualDevice(seed=3)))
+    turner.slips, turner.corrects = [(0.0, 0.0), (30.0, 0.0), (then, 2.5)], False
+    three, taken, insisted = FIVE_POSITIONS[:3], dict[int, Average](), set[int]()
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        engine = Engine(turner.driver, turner, ABOUT, recorder, 60.0, taken,
+                        insisted=insisted)  # fmt: skip
+        if resumed:
+            engine.run(hold_all(three[:2], 5.0))
+            assert insisted == {1} and list(taken) == [0, 1]
+            engine = Engine(turner.driver, turner, ABOUT, recorder, 60.0, taken,
+                            insisted=insisted)  # fmt: skip
+        engine.run(hold_all(three, 5.0))
+    marks = list(Session.open(tmp_path / "s").marks())
+    assert list(insisted_positions(marks)) == [1] and insisted == {1}
+    assert [m["position"] for m in marks if m["event"] == "window"] == [0, 1, 2]
 
 
 def test_an_operator_may_stop(bench: Bench) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from argparse import Namespace
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ from talking import talking
 from fieldcal.cli import main
 from fieldcal.commands import ports, run
 from fieldcal.commands.find_device import find_device
-from fieldcal.core.errors import InputError
+from fieldcal.core.errors import InputError, Stopped
 from fieldcal.core.samples import Array, Block, split_by_time
 from fieldcal.run.introduction import introduce_device, rate_unit_from_turn
 from fieldcal.run.movers import VirtualMover
@@ -69,6 +71,13 @@ def test_a_device_that_takes_its_bias_out_is_seen() -> None:
     centred = at_rest(f, np.zeros(3))
     centred = Block.of(centred.t, centred.acc, centred.gyr - centred.gyr.mean(axis=0))
     assert "takes their bias out itself" in introduce_device(centred, 9.81).summary
+    zeros = Block.of(
+        centred.t, centred.acc, np.zeros((N, 3))
+    )  # while it thinks it rests
+    assert "takes their bias out itself" in introduce_device(zeros, 9.81).summary
+    assert not introduce_device(zeros, 9.81, bias_stated=True).rates_zeroed
+    stuck = Block.of(centred.t, centred.acc, np.full((N, 3), 0.01))
+    assert not introduce_device(stuck, 9.81).rates_zeroed
     assert (
         "bias out" not in introduce_device(at_rest(f, np.full(3, 0.01)), 9.81).summary
     )
@@ -118,6 +127,41 @@ def test_the_one_that_answers_is_taken_and_said(
     said = capsys.readouterr().err
     assert "+z is up" in said and "witmotion at" in said
     assert f'the next time: --device "{args.device}" --mounting=+x,-z,+y' in said
+
+
+def test_only_a_clear_answer_to_the_question_takes_a_device(
+    devices: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Enter in the seconds before, by somebody impatient, is none; nor is a typo."""
+    pytest.importorskip("termios")
+    hand, terminal_file = os.openpty()
+    asked = []
+
+    def answer(text: str, end: str = "\n") -> None:
+        if not end:
+            asked.append(text)
+            os.write(hand, answers.pop(0))
+
+    monkeypatch.setattr("fieldcal.commands.find_device._print_line", answer)
+    monkeypatch.setattr("fieldcal.commands.find_device.LISTEN_S", 0.2)
+    with os.fdopen(terminal_file) as file:
+        monkeypatch.setattr(sys, "stdin", file)
+        for answers, takes in (
+            ([b"what\n", b"\x1b[A\n", b"\n"], True),
+            ([b"Yes\n"], True),
+            ([b"w\n", b"n\n"], False),
+            ([b"q\n"], False),
+            ([b"\x04"], False),  # Ctrl-D
+        ):
+            asked.clear()
+            many, args = len(answers), options(headless=False)
+            os.write(hand, b"\n\n")
+            with nullcontext() if takes else pytest.raises(Stopped):
+                find_device(args)
+            assert len(asked) == many and bool(args.device) == takes
+    os.close(hand)
 
 
 def test_two_on_one_port_are_refused_before_anything_is_recorded(

@@ -165,6 +165,10 @@ def test_what_is_too_much_to_read_is_counted() -> None:
             {"position": [POSITIONS[0], {**POSITIONS[1], "beta": 1.0}]},
             "[[position]] number 2 beta is not known: write beta_deg",
         ),
+        # written above the first table, it would state nothing
+        ({"latitude_deg": 50.0}, "write latitude_deg below [site]"),
+        ({"level": 0.01}, "level belongs into a table: write level_deg below [site]"),
+        ({"warm_up_s": 9.0}, "write warm_up_s below [run]"),
     ],
 )
 def test_a_misspelt_key_is_no_key_of_ones_own(
@@ -174,7 +178,7 @@ def test_a_misspelt_key_is_no_key_of_ones_own(
     with pytest.raises(PlanError) as error:
         plan_file.task_from_tables({**plan(), **tables}, "p.toml")
     assert says in str(error.value)
-    own = {**plan(), "notes": "mine", "site": {"town": "Kyiv"}}
+    own = {**plan(), "notes": "mine", "name": "mine", "site": {"town": "Kyiv"}}
     assert plan_file.task_from_tables(own, "p.toml").about.raw["notes"] == "mine"
 
 

@@ -19,6 +19,7 @@ from fieldcal.commands.decision_view import show_decision
 from fieldcal.commands.help import CommandParser
 from fieldcal.commands.run_task import make_task
 from fieldcal.core.errors import InputError, SessionError
+from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
 from fieldcal.run.resuming import open_for_resume, positions_left_out, recorded_averages
@@ -341,6 +342,34 @@ def test_behind_a_no_go_stands_what_was_left_out(
     show_decision(found, tmp_path / "s")
     said = " ".join(capsys.readouterr().out.split())
     assert "first: take position 2, left out so far: fieldcal run --resume" in said
+
+
+def test_behind_a_no_go_stands_the_command_that_states_what_nobody_did(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    five = [dict(zip(("alpha_deg", "beta_deg"), p.degrees or (), strict=True))
+            for p in FIVE_POSITIONS]  # fmt: skip
+    for name, site, unsaid in (
+        ("nothing", {}, "--latitude DEG --height M --angles DEG"),
+        ("site", {"latitude_deg": 50.0}, "--angles DEG"),
+        ("all", {"latitude_deg": 50.0, "angle_setting_deg": 0.05}, ""),
+    ):
+        folder = tmp_path / name
+        Recorder(folder, {"format": 1, "site": site, "position": five}).close()
+        checks = [
+            {"name": check, "ok": False, "says": "no"}
+            for check in ("site", "angles", "acc_scale uncertainty")
+        ]
+        found = Calibration(
+            names=(), values=np.zeros(0), covariance=np.zeros((0, 0)), units=(),
+            method="joint", chi2=0.0, dof=0, rms=0.0,
+            info={"decision": {"go": False, "checks": checks}},
+        )  # fmt: skip
+        show_decision(found, folder)
+        said = " ".join(capsys.readouterr().out.split())
+        command = f"--resume {folder} {unsaid}".replace(" ", "")
+        assert command in said.replace(" ", ""), said
+        assert ("state what nobody stated" in said) == bool(unsaid)
 
 
 def test_without_a_name_the_last_run_is_gone_on_with(

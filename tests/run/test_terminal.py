@@ -10,12 +10,12 @@ import pytest
 from rich.console import Console
 from terminal_screens import HOLD, MISPLACED, SCREENS, screen, sized, view
 
-from fieldcal.core.positions import FIVE_POSITIONS
+from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator import terminal
 from fieldcal.run.operator.banner import can_draw, draw_large
-from fieldcal.run.operator.protocol import Phase
+from fieldcal.run.operator.protocol import TAKEN_BEFORE, Phase
 from fieldcal.run.operator.redrawing import Redrawing
 from fieldcal.run.operator.terminal import ConsoleOperator
 from fieldcal.run.position_check import PositionCheck
@@ -167,6 +167,34 @@ def test_a_link_that_is_silent_is_said_large_and_for_as_long_as_it_is(
     assert "N O   S A M P L E S" in said and "! no samples come from ttyUSB0" in said
     operator.show(view("turning"))
     assert "S A M P L E S" not in screen(operator)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (40, 15)])
+def test_positions_that_a_remedy_adds_are_counted_from_the_first(
+    size: tuple[int, int],
+) -> None:
+    """Of three more, the first is not the last."""
+    operator = sized(*size)
+    operator.place(Hold(5, Position.deg(-45.0, 5.0), 9.0, further=2))
+    shown = screen(operator, *size)
+    assert ("position 6 of 8" if size == (80, 24) else "6/8") in shown
+    assert size == (80, 24) or "to come 1 2 3 4 5 7 8" in " ".join(shown.split())
+
+
+def test_a_lost_device_is_said_once_and_what_was_told_survives_what_is_done() -> None:
+    operator = sized(80, 24)
+    silent = WaitReason(WaitState.NO_SAMPLES, "no samples come from ttyUSB0: check it")
+    operator.show(view("silent", reason=silent))
+    operator.tell("ttyUSB0 went silent: goes on by itself, within 117 s")
+    shown = screen(operator)
+    assert "N O   S A M P L E S" in shown and "within 117 s" in shown
+    assert "no samples come from" not in shown  # twice the same, in other words
+    operator.tell("samples come from ttyUSB0 again")
+    before = Hold(0, FIVE_POSITIONS[0], 30.0)
+    operator.show(view("taken", hold=before, reason=TAKEN_BEFORE))
+    operator.place(HOLD)
+    shown = screen(operator)
+    assert "samples come from ttyUSB0 again" in shown and "117 s" not in shown
 
 
 def test_hands_off_does_not_ask_to_be_turned_on(operator: ConsoleOperator) -> None:

@@ -93,7 +93,7 @@ def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
     with os.fdopen(terminal_file) as file:
         monkeypatch.setattr(sys, "stdin", file)
         with Keyboard() as keyboard:
-            os.write(hand, b"\x1a\x13r")  # Ctrl-Z, Ctrl-S: passed on, not carried out
+            os.write(hand, b"\x1a\x13\x1cr")  # Ctrl-Z, Ctrl-S, Ctrl-\: do nothing
             assert keyboard.pressed() == "repeat"
             os.write(hand, b"q\n")
             assert keyboard.pressed() == "stop"
@@ -111,6 +111,18 @@ def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
             assert keyboard.pressed() == "stop" and keyboard.pressed() is None
         assert termios.tcgetattr(terminal_file) == before
     os.close(hand)
+
+
+def test_pasted_text_presses_no_key(hand: int) -> None:
+    """A command line in the clipboard has a q, and would skip by its double s."""
+    with Keyboard() as keyboard:
+        os.write(hand, b"\x1b[200~run --resume sessions/q\rss\x1b[201~r")
+        assert keyboard.pressed() == "repeat" and keyboard.pressed() is None
+        for piece in (b"\x1b[20", b"0~", b"qq\nss", b"\x1b[2", b"01~"):
+            os.write(hand, piece)
+            assert keyboard.pressed() is None
+        os.write(hand, b"q")
+        assert keyboard.pressed() == "stop"
 
 
 @pytest.fixture

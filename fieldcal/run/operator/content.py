@@ -11,7 +11,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.operator.instruction import Instruction, position_label
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.operator.widgets import alert
-from fieldcal.run.wait_reason import reminder
+from fieldcal.run.wait_reason import WaitState, reminder
 
 SENTENCES_SHOWN = 2
 """Number of sentences that are shown."""
@@ -47,6 +47,7 @@ class RunContent:
         self._told: list[str] = []
         self._told_before: list[str] = []
         self._reminder = ""
+        self._silence_told = False
 
     def position_asked(self, hold: Hold) -> None:
         """A position is asked for."""
@@ -60,6 +61,7 @@ class RunContent:
     def sentence_told(self, text: str) -> None:
         """A sentence was told that must not be missed."""
         self._told = [*(t for t in self._told if t != text), text][-SENTENCES_SHOWN:]
+        self._silence_told = self.phase == "silent"
 
     def sentence_withdrawn(self, text: str) -> None:
         """A sentence no longer applies."""
@@ -76,10 +78,11 @@ class RunContent:
         if view.phase == "taken":
             known = view.sigma[:3][np.isfinite(view.sigma[:3])]
             self.taken[view.hold.index] = float(known.max()) if len(known) else np.nan
-            self._told = []
+            if view.reason.state is not WaitState.TAKEN_BEFORE:  # nothing is done then
+                self._told = []
         if not alert(view):
             self._reminder = ""
-        self.view, self.worked = view, 0.0
+        self.view, self.worked, self._silence_told = view, 0.0, False
 
     @property
     def is_worked_out(self) -> bool:
@@ -98,6 +101,13 @@ class RunContent:
         return self.view.phase if self.view else ""
 
     @property
+    def count(self) -> int:
+        """Number of positions, with those that are known to follow."""
+        known = len(self.positions)
+        hold = self.hold
+        return known if hold is None else max(known, hold.index + 1 + hold.further)
+
+    @property
     def current_index(self) -> int:
         """Number of the position asked for, from 0; -1 before there is one."""
         return self.hold.index if self.hold else -1
@@ -105,13 +115,17 @@ class RunContent:
     @property
     def instruction(self) -> Instruction:
         """The present instruction."""
-        number = position_label(self.hold, len(self.positions), self.most)
+        number = position_label(self.hold, self.count, self.most)
         return Instruction.of(self.hold, self.view, number, self.worked)
 
     @property
     def sentences(self) -> list[str]:
-        """Sentences that must not be missed, and why the run waits."""
-        why = alert(self.view) if self.view else ""
+        """Sentences that must not be missed, and why the run waits.
+
+        What was told of a silent device since it was seen to be silent says why as
+        well, and more.
+        """
+        why = alert(self.view) if self.view and not self._silence_told else ""
         told = [text for text in self._told if text != why]
         return [*told, *([self._reminder + why] if why else [])]
 

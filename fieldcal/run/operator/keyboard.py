@@ -3,8 +3,9 @@
     Enter, space   confirm      r   repeat      s   skip      q   stop
 
 While the keyboard is open, the terminal passes keys on at once and does not show them.
-Ctrl-C interrupts as usual. Ctrl-Z and Ctrl-S have no effect: they would suspend the run
-without notice, and samples would be lost. Input that is no terminal has no keys.
+Ctrl-C interrupts as usual. Ctrl-Z, Ctrl-S and Ctrl-backslash have no effect: they would
+suspend or kill the run without notice, and samples would be lost. Pasted text is no
+key, as far as the terminal marks it. Input that is no terminal has no keys.
 """
 
 from __future__ import annotations
@@ -44,6 +45,12 @@ ends in a Q, F4 in an S."""
 UNFINISHED = re.compile("\x1b(?:\\[[0-?]*[ -/]*|O)?$")
 """Beginning of such a sequence whose end has not arrived: a slow link may divide it."""
 
+MARK_PASTES, LEAVE_PASTES = "\x1b[?2004h", "\x1b[?2004l"
+"""Orders to a terminal to mark text that is pasted, and no longer to do so."""
+
+PASTE_BEGINS, PASTE_ENDS = "\x1b[200~", "\x1b[201~"
+"""Marks around pasted text. Source: xterm control sequences, bracketed paste mode."""
+
 SHORT_HELP: dict[Phase, str] = {
     "turning": "Enter ok · r last · s skip · q stop",
     "averaging": "r again · s skip · q stop",
@@ -66,6 +73,7 @@ class Keyboard:
         usable = terminal is not None and not terminal.closed and terminal.isatty()
         self._keys: Keys | None = None
         self._stop, self._skip, self._unfinished = False, False, ""
+        self._pasting = False
         if usable:
             windows = importlib.util.find_spec("termios") is None
             self._keys = WindowsKeys() if windows else PosixKeys(terminal.fileno())
@@ -95,7 +103,8 @@ class Keyboard:
         text = self._keys.read() if self._keys else ""
         if text is None:
             self._keys = None  # the terminal is gone
-        letters = OTHER_KEYS.sub("", self._with_unfinished(text or "")).lower()
+        typed = self._without_pasted(self._with_unfinished(text or ""))
+        letters = OTHER_KEYS.sub("", typed).lower()
         wishes = [KEYS[key] for key in letters if key in KEYS]
         if stop or "stop" in wishes:
             return "stop"
@@ -115,9 +124,27 @@ class Keyboard:
             text, self._unfinished = text[: begun.start()], begun.group()
         return text
 
+    def _without_pasted(self, text: str) -> str:
+        """Keys without pasted text, whose letters nobody pressed."""
+        typed = ""
+        while text:
+            mark = PASTE_ENDS if self._pasting else PASTE_BEGINS
+            before, found, text = text.partition(mark)
+            typed += "" if self._pasting else before
+            self._pasting ^= bool(found)
+        return typed
+
     def forget(self) -> None:
         """Discard keys pressed so far, meant for an earlier step; a stop is for all."""
         self._stop, self._skip = self.pressed() == "stop", False
+
+
+def forget_typed_lines() -> None:
+    """Discard what was typed on the terminal before a question that a line answers."""
+    if importlib.util.find_spec("termios") is not None and sys.stdin.isatty():
+        import termios
+
+        termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
 
 
 class Keys(Protocol):
@@ -150,7 +177,7 @@ class PosixKeys:
         mode = termios.tcgetattr(self._file)
         mode[tty.IFLAG] &= ~termios.IXON
         no_key = os.fpathconf(self._file, "PC_VDISABLE")
-        mode[tty.CC][termios.VSUSP] = bytes([no_key])
+        mode[tty.CC][termios.VSUSP] = mode[tty.CC][termios.VQUIT] = bytes([no_key])
         termios.tcsetattr(self._file, termios.TCSADRAIN, mode)
 
     def close(self) -> None:

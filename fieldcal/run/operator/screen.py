@@ -116,7 +116,7 @@ class Screen:
         what = self._content.instruction
         number = f"  {hold.index + 1}" if hold else ""
         if hold and self._content.most is None:
-            number += f"/{len(self._content.positions)}"
+            number += f"/{self._content.count}"
         style = f"bold reverse {what.colour}".strip()
         width = self._console.width
         lines: list[RenderableType] = [
@@ -128,7 +128,7 @@ class Screen:
         lines.append(Text(f" {name}".ljust(width), style))
         if view and hold is view.hold:
             lines += [Text(line) for line in widgets.short_gauges(view)]
-        content, count = self._content, len(self._content.positions)
+        content, count = self._content, self._content.count
         now, out = content.current_index, content.left_out
         taken = Text(widgets.progress(content.taken, now, count, out))
         room = self._console.height - 1 - len(self._console.render_lines(

@@ -19,7 +19,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import Mover
 from fieldcal.run.operator import widgets
 from fieldcal.run.operator.content import RunContent
-from fieldcal.run.operator.keyboard import Keyboard
+from fieldcal.run.operator.keyboard import LEAVE_PASTES, MARK_PASTES, Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.redrawing import Redrawing
 from fieldcal.run.operator.screen import Screen
@@ -82,6 +82,7 @@ class ConsoleOperator:
             self._keyboard.__enter__()
         if self._live:
             self._live.start()
+            self._order(MARK_PASTES)
             self._draw()
         return self
 
@@ -89,9 +90,15 @@ class ConsoleOperator:
         self._redrawing.stop()
         if self._live:
             self._draw()
+            self._order(LEAVE_PASTES)
             self._live.stop()
         if self._keyboard:
             self._keyboard.__exit__()
+
+    def _order(self, sequence: str) -> None:
+        """Give the terminal an order, unless it would show that as letters."""
+        if self._has_keys() and not self._console.legacy_windows:
+            self._console.file.write(sequence)
 
     def place(self, hold: Hold) -> None:
         """Ask for a position."""

@@ -15,7 +15,8 @@ windows, s_0^2 with nu_0 (`window_variances`):
 
 Of s_0^2, 1 is the white noise of all windows; the rest, the part w = 1 - 1 / s_0^2, is
 how they sway or tremble, and that of a hand differs from window to window, of which a
-few windows tell little: nu_0 is at most `SWAY_DOF` / w^2.
+few windows tell little: nu_0 is at most `SWAY_DOF` / w^2. A hand that trembles about
+one axis may lean about another in the next window, so w is the largest of the six.
 
 A push moves the three axes of a triad at the same time. With R the correlation of
 their amplitudes and b = a / sqrt v, q_i = b' R^-1 b is without a push three times a
@@ -151,7 +152,7 @@ def amplitude_noise(
     total = np.array([s.sum(axis=0) for s in square])
     each, near = matched.amplitudes_per_dof, len(matched.taps)
     common, nu = variances_of_others(total / np.maximum(count, 1.0), count / each)
-    swaying = 1 - 1 / np.maximum(common, 1.0)
+    swaying = 1 - 1 / np.maximum(common, 1.0).max(axis=1, keepdims=True)
     nu = np.minimum(nu, SWAY_DOF / np.maximum(swaying, 1e-3) ** 2)
     noise = []
     for w in range(len(windows)):

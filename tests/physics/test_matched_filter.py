@@ -126,6 +126,21 @@ def test_a_few_windows_of_a_hand_do_not_say_how_the_next_sways(seed: int) -> Non
     assert first.log_chances(windows[0]).min() > np.log(1e-5)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_hand_that_trembles_about_one_axis_may_lean_about_another(seed: int) -> None:
+    """On a table, where no axis shows any sway, the same is a push."""
+    white = MatchedFilter(1, np.array([1.0]), 1.0)
+    told = []
+    for tremor in (4.0, 1.0):
+        windows = [w / 2 for w in drawn(1e9, 4, 10, seed)]
+        for w in windows:
+            w[:, 3] *= tremor
+        windows[0][:, 1] = [1.0, -0.5, 12.0, 0.5]
+        first = amplitude_noise(windows, white)[0]
+        told.append(first.log_chances(windows[0])[:, 0].min())
+    assert told[0] > np.log(1e-5) > np.log(1e-7) > told[1]
+
+
 def test_the_variance_at_an_instant_knows_nothing_of_it() -> None:
     white = MatchedFilter(1, np.array([1.0]), 1.0)
     windows = drawn(1e9, 50, 1, 6)

@@ -201,10 +201,22 @@ class Observations:
                 f"{CHANNELS[three][axis]}: take its window again or leave it out"
             )
         if not np.isfinite(cov).all() or (np.linalg.eigvalsh(cov) <= 0).any():
-            raise InputError(
-                f"the {sensor}' means have no uncertainty above 0 {UNITS[three][0]}: "
-                "a window of repeated equal values tells nothing about its noise"
-            )
+            raise InputError(_no_noise_text(sensor, mean, UNITS[three][0]))
+
+
+def _no_noise_text(sensor: str, mean: Array, unit: str) -> str:
+    """Error text for means (n, 3) of which some have no uncertainty."""
+    if not mean.any(axis=0).all():
+        return (
+            f"the {sensor} read 0 {unit} in every sample at rest: the device, or the"
+            " program that wrote this, sets them to zero while it is still, so their"
+            " bias is not in the recording; switch this off (dead band, still"
+            " detection, zero velocity update) and record again"
+        )
+    return (
+        f"the {sensor}' means have no uncertainty above 0 {unit}: a window of repeated"
+        " equal values tells nothing about its noise; record with more digits"
+    )
 
 
 def _regularised(covariance: Array) -> Array:

@@ -48,7 +48,7 @@ def test_correlations_that_a_window_is_too_short_to_know_are_dropped() -> None:
         ({"time": np.zeros(4)}, "time is (4,) where 5 positions need (5,)"),
         ({"covariance": np.zeros((5, 6, 6))}, "the accelerometers' means have no"
          " uncertainty above 0 m/s^2: a window of repeated equal values tells nothing"
-         " about its noise"),
+         " about its noise; record with more digits"),
     ],
 )  # fmt: skip
 def test_observations_that_cannot_be_are_refused(
@@ -157,12 +157,19 @@ def test_no_position_and_gyroscopes_without_noise_are_refused() -> None:
         Observations((), np.zeros((0, 6)), np.zeros((0, 6, 6)), 9.8)
     assert str(error.value) == "there is no position: mark at least two"
     with pytest.raises(InputError) as error:
-        observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS), gyr=np.zeros((5, 3)),
+        observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS), gyr=np.full((5, 3), 0.01),
                 sigma_gyr=0.0)  # fmt: skip
     assert str(error.value) == (
         "the gyroscopes' means have no uncertainty above 0 rad/s: a window of repeated"
-        " equal values tells nothing about its noise"
+        " equal values tells nothing about its noise; record with more digits"
     )
+    gated = np.full((5, 3), 0.01) * [1.0, 1.0, 0.0]
+    with pytest.raises(
+        InputError,
+        match=r"^the gyroscopes read 0 rad/s in every "
+        r"sample at rest: .*; switch this off \(.*\) and record again$",
+    ):
+        observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS), gyr=gated, sigma_gyr=0.0)
 
 
 def test_a_mean_that_is_missing_on_a_table_is_named_by_its_position() -> None:

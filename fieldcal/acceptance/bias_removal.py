@@ -40,6 +40,9 @@ unknown direction; the denominator of (5) is then, with m = |c|,
 
     p(c) = N(c; 0, sigma_c^2) exp(-w^2 / 2 sigma_c^2) sinh(x) / x,  x = m w / sigma_c^2
                                                                                    (6)
+A device that follows its bias over a minute or more leaves in each window another part
+of what turns and noise have put into it: means of zero with some scatter, instead of
+exactly zero. sigma^2 of (5) has this scatter as well (`LEFT_OVER`).
 An autopilot that reports the offset that it subtracts has, with even odds, averaged it
 over any T when it started: a bias of s_b^2 = noise^2 / (T rate) then remains. Of
 gyroscopes with a bias at most one in x has a B above x; a share TRACKING of all devices
@@ -77,6 +80,10 @@ POSITION_DEPENDENCE = (0.0, 0.01, 0.03, 0.1)
 """Dependence of gyroscopes on the position, mostly g-sensitivity, as part of the spread
 of their biases; all are equally likely. The Earth's rate is added except for the first,
 as in a simulation."""
+
+LEFT_OVER = POSITION_DEPENDENCE
+"""What a device that follows its bias slowly leaves of it in a window, as parts of the
+same spread; all are equally likely."""
 
 LAGS = np.geomspace(0.25, 16.0, 49)
 """Time constants of (3), and times of (4), that are tried, s."""
@@ -181,6 +188,7 @@ def _removal_probability(
 
     `prior` are the log odds of a device that subtracts its bias.
     """
+    every = [np.hypot(one, part * keeps.repeat) for one in every for part in LEFT_OVER]
     seen = np.isfinite(means) & (own > 0)
     count, axes = int(seen.sum()), means.shape[1]
     if count < axes * MIN_WINDOWS or not seen.any(axis=0).all():

@@ -312,6 +312,21 @@ def test_of_gyroscopes_with_biases_hardly_any_are_taken_for_such_a_device(
     assert taken <= 0.01 * count
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bias_that_is_tracked_slowly_leaves_means_about_zero(seed: int) -> None:
+    """Each turn puts something into what is subtracted, which stays for a minute.
+
+    Gyroscopes that keep a bias scatter as much, where they feel the force, about it.
+    """
+    rng, told = np.random.default_rng(seed), []
+    scatter = np.repeat(rng.normal(0.0, 6e-5, (6, 3)), COUNT, axis=0)
+    for bias in (0.0, REPEAT * rng.standard_normal(3)):
+        windows, block = at_rest(rng, 0.0)
+        block.gyr[:] += bias + scatter
+        told.append(bias_removal_probability(windows, block, KEEPS, LEAST)[0])
+    assert told[0] > DOUBT > 0.01 > told[1]
+
+
 def all_zero(biased: int = 0) -> tuple[list[Average], Block]:
     """Six windows of zeros; the first axes have noise about a bias instead."""
     windows, block = at_rest(np.random.default_rng(21), 1e-3)

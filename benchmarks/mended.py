@@ -47,6 +47,18 @@ SESSIONS = (
         ("held by hand", "table kicked"),
         "5.3 sigma: a knock in a still window, smeared since others were held by hand",
     ),
+    Session(75101003, None, "14.8 sigma: a restart beside axes that are not square"),
+    Session(75101024, None, "20 sigma: rates that are all zero at rest, bias removed"),
+    Session(
+        75220002,
+        ("device restarted",),
+        "12 sigma: a restart after which the gyroscopes' biases were the same",
+    ),
+    Session(
+        75221021,
+        ("device restarted",),
+        "13.8 sigma in some processes: the jump was carried with any of three sizes",
+    ),
 )
 
 MOTIONS = (

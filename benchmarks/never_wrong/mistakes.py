@@ -109,9 +109,12 @@ def mean_taken_and_rounded(written: Written, bench: Bench, rng: Rng) -> Written:
 
 
 def gyr_tracked(written: Written, bench: Bench, rng: Rng) -> Written:
-    """The device takes the bias out of its rates whenever it is at rest."""
+    """The device takes the bias out of its rates whenever it is at rest.
+
+    It follows the bias within half a second to five minutes.
+    """
     s, gyr = written.samples, written.samples.gyr.copy()
-    keep = np.exp(-1 / bench.rate / rng.uniform(0.5, 5))
+    keep = np.exp(-1 / bench.rate / log_uniform(rng, 0.5, 300.0))
     moving = np.linalg.norm(gyr - np.median(gyr, axis=0), axis=1)
     bias = gyr[: int(bench.rate)].mean(axis=0)
     bar = 8 * bench.gyr_noise + 2 * EARTH

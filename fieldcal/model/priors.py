@@ -133,7 +133,7 @@ WRONG_LATITUDE_CHANCE = 1e-3
 
 RESTART_CHANCE = 0.1
 """Probability that an effect with an instant begins where samples are missing between
-two positions: a link fails more often than a supply."""
+two positions, by itself: what was knocked or set up anew meanwhile, or one triad."""
 
 RESTART_SIZES = SIZES[[14, 17, 20]]
 """Sizes of the jumps of a restart, in typical ones, equally likely: 0.03 to 1. Data
@@ -142,7 +142,8 @@ sheets state turn-on repeatabilities of 0.1 to 5 mg, and of 10 to 400 deg/h."""
 BOTH_RESTART_ODDS = 20.0
 """Odds that all axes of a triad have changed there by such amounts, if those of the
 other triad have; the inverse for some axes. Judged: after a restart every bias is
-another one."""
+another one. A restart has odds of 2 with it, before rows are looked at: a link fails as
+often, but a wrong bias costs more than one position."""
 
 AS_STATED_CHANCE = 0.2
 """Probability that a kind of error is as small as in the stated grade, if the biases

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomlkit
 
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
@@ -29,7 +30,7 @@ from fieldcal.session.installed_calibration import (
 )
 from fieldcal.session.marks import read_marks
 
-TURNED = {"alpha_deg": 45, "beta_deg": 5}
+HOME, TURNED = {"alpha_deg": 0, "beta_deg": 0}, {"alpha_deg": 45, "beta_deg": 5}
 VERIFIED = {"alpha_deg": 0, "beta_deg": 5}
 
 
@@ -58,17 +59,22 @@ def restarted(
 ) -> Iterator[tuple[Path, str, str, dict[str, Any]]]:
     """A run across two starts of its autopilot; the latter while a window is taken.
 
-    No turn of it was recorded, so that a position that is not fitted bears witness. The
-    session, the autopilot's address, its control socket, and what it conceals.
+    After a restart all biases may be other ones, so that the first position is taken
+    once more. No turn was recorded across it: a position that is not fitted bears
+    witness. The session, the autopilot's address, its control socket, and what it
+    conceals.
     """
     folder = tmp_path_factory.mktemp("restarted")
-    session, truth = folder / "s", folder / "truth.json"
+    session, truth, plan = folder / "s", folder / "truth.json", folder / "plan.toml"
+    again = {"position": [HOME, TURNED, HOME], "run": {"procedure": "positions"}}
+    plan.write_text(tomlkit.dumps(again))
     sim = ["--mavlink", "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5", "--speed", "20"]
     sim += ["--rate", "100", "--gravity=9.81", "--truth", str(truth)]
     sim += steady(folder)
     with simulated(*sim) as (place, control):
         url = f"mavlink:{place}"
-        run = [*TWO_POSITION, "--gravity=9.81", "--seconds", "20", "--json"]
+        run = [str(plan) if word == "two_position" else word for word in TWO_POSITION]
+        run += ["--gravity=9.81", "--seconds", "20", "--json"]
         run += ["--verify", "-o", str(session)]
         with subprocess.Popen(
             [*run, "--device", f"{url}?rate=100"], stdout=subprocess.PIPE, text=True
@@ -79,6 +85,8 @@ def restarted(
             wait(process, lambda: len(events(session, "asked")) == 2)
             order(control, fault={"reboot_s": 3.0})
             wait(process, lambda: len(events(session, "window")) == 2)
+            order(control, turn=HOME)
+            wait(process, lambda: len(events(session, "window")) == 3)
             order(control, turn=VERIFIED)
             printed, _ = process.communicate()
         assert process.returncode == 0, json.loads(printed)["decision"]["reasons"]

@@ -58,6 +58,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.acceptance.window_cells import SPECTRUM, WindowCells
 from fieldcal.acceptance.zero_rates import (
     log_odds_of_no_bias,
     zero_rates,
@@ -88,18 +89,12 @@ same spread; all are equally likely."""
 LAGS = np.geomspace(0.25, 16.0, 49)
 """Time constants of (3), and times of (4), that are tried, s."""
 
-CELLS = 256
-"""Largest number of means in a window, for fits of (3) and (4)."""
-
 MOVED, MOVED_S = 2e-3, 0.25
 """Spread of mean rates over so long, rad/s and s, beyond which a device moves: 0.1
 deg/s. A hand makes 5e-3 to 2e-2, and noise of a low-cost gyroscope at rest 6e-4."""
 
 UNKNOWN = np.full(3, np.nan)
-
-SPECTRUM, OCTAVES, FILTERS = 16, 4, 4.0
-"""Fewest samples of a periodogram and powers of an octave; number of octaves; standard
-deviations by which an octave below the band of a filter has more power."""
+"""Biases of which nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +143,7 @@ def _removal_behind_noise(
     held: Sequence[Block], axes: Index, keeps: BiasSpread, least: float, prior: float
 ) -> tuple[float, str]:
     """The probability with that of some axes, from prior log odds, and chi2."""
-    cells = [_WindowCells.of(one, axes) for one in held if len(one) >= SPECTRUM]
+    cells = [WindowCells.of(one, axes) for one in held if len(one) >= SPECTRUM]
     if not cells:
         return 0.0, ""
     second = np.median([one.noise_of_a_second for one in cells], axis=0)
@@ -233,13 +228,13 @@ def chance_near_zero(sigma: Array, spread: float | Array) -> float:
     return float(np.minimum(4 * sigma / np.sqrt(2 * np.pi) / spread, 1.0).prod())
 
 
-def _settled_means(cells: Sequence[_WindowCells]) -> tuple[Array, Array]:
+def _settled_means(cells: Sequence[WindowCells]) -> tuple[Array, Array]:
     """Values c of (3) that the gyroscopes settle to, and their errors, (w, 3) each."""
     return _fit_constants(cells, LAGS, lambda t, lag: np.exp(-t / lag))
 
 
 def _zeroed_means(
-    cells: Sequence[_WindowCells],
+    cells: Sequence[WindowCells],
 ) -> Iterator[tuple[Array, Array, Sequence[Array]]]:
     """Means c of (4), their own error, and that with the noise of any T."""
     first, last = max(c.t[0] for c in cells), min(c.t[-1] for c in cells) / 2
@@ -252,7 +247,7 @@ def _zeroed_means(
 
 
 def _fit_constants(
-    cells: Sequence[_WindowCells], times: Array, shape: Callable[[Array, float], Array]
+    cells: Sequence[WindowCells], times: Array, shape: Callable[[Array, float], Array]
 ) -> tuple[Array, Array]:
     """Fit constants with a shape; returns those for the best time, and errors."""
     every = [[one.fit_constant(shape(one.t, time)) for one in cells] for time in times]
@@ -319,67 +314,3 @@ class _KeptBias:
 def _log_mean_exp(logs: Sequence[float]) -> float:
     """Log of the mean of exponentials."""
     return float(np.logaddexp.reduce(logs) - np.log(len(logs)))
-
-
-@dataclass(frozen=True, slots=True)
-class _WindowCells:
-    """Gyroscopes at rest in a window, as means over equal numbers of samples.
-
-    Attributes
-    ----------
-    t : (k,) s since the window began
-    gyr : (k, a) rad/s, of some axes
-    noise : (a,) rad/s, white noise of each mean
-
-    """
-
-    t: Array
-    gyr: Array
-    noise: Array
-
-    @classmethod
-    def of(cls, one: Block, axes: Index) -> _WindowCells:
-        """The means of a window, at most `CELLS`, of some axes.
-
-        The mean of an exponential over a cell is its value in the middle, times the
-        same factor for all cells.
-        """
-        each = -(-len(one) // CELLS)
-        count = len(one) // each
-        t, gyr = one.t[: count * each] - one.t[0], one.gyr[: count * each, axes]
-        level = _white_noise(one.gyr[:, axes]) / np.sqrt(each)
-        means = gyr.reshape(count, each, len(axes)).mean(axis=1)
-        return cls(t.reshape(count, each).mean(axis=1), means, level)
-
-    @property
-    def noise_of_a_second(self) -> Array:
-        """White noise of a mean over one second, rad/s, (3,)."""
-        second: Array = self.noise * np.sqrt(self.t[1] - self.t[0])
-        return second
-
-    def fit_constant(self, shape: Array) -> tuple[Array, Array, Array]:
-        """Fit c and a shape: c, its error, and chi2 of the rest (0 without noise)."""
-        design = np.column_stack([np.ones(len(self.t)), shape])
-        inner = np.linalg.inv(design.T @ design)
-        fit = inner @ (design.T @ self.gyr)
-        left = ((self.gyr - design @ fit) ** 2).sum(axis=0)
-        some = self.noise > 0
-        chi2 = np.divide(left, self.noise**2, out=np.zeros(len(some)), where=some)
-        return fit[0], self.noise * np.sqrt(inner[0, 0]), chi2
-
-
-def _white_noise(gyr: Array) -> Array:
-    """White noise of a sample, (3,); before a filter, if there is one.
-
-    A filter, or a program that interpolates samples, leaves less power in the upper
-    octaves than in those below. The median of m powers scatters by its 1.44 m^-1/2.
-    """
-    power = np.abs(np.fft.rfft(gyr - gyr.mean(axis=0), axis=0)[1:-1]) ** 2
-    level: Array = np.median(power, axis=0)
-    for k in range(1, OCTAVES):
-        octave = power[len(power) >> (k + 1) : len(power) >> k]
-        if len(octave) < SPECTRUM:
-            break
-        own, scatters = np.median(octave, axis=0), 1.44 / np.sqrt(len(octave))
-        level = np.where(own > (1 + FILTERS * scatters) * level, own, level)
-    return np.asarray(np.sqrt(level / len(gyr) / np.log(2.0)))

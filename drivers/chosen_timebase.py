@@ -21,6 +21,7 @@ class ChosenTimebase:
     options : ``rate`` in Hz is taken from them
     resolution : of the device's stamps, s
     span : time after which the device's counter wraps, s
+    since_power_on : whether the stamps count from when the device was switched on
 
     """
 
@@ -30,10 +31,14 @@ class ChosenTimebase:
         options: Options,
         resolution: float = 0.0,
         span: float = float("inf"),
+        *,
+        since_power_on: bool = False,
     ) -> None:
         rate = options.number("rate", 0.0, 1e-3, 1e6)
         self._health = health
-        self._stamps = StampTimebase(health, resolution, span)
+        self._stamps = StampTimebase(
+            health, resolution, span, since_power_on=since_power_on
+        )
         self._else = RateTimebase(health, rate) if rate else ArrivalTimebase(health)
         self._chosen: Timebase | None = None
 

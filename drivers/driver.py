@@ -89,6 +89,8 @@ class LinkHealth:
     repeated : samples dropped because their stamp was an old one
     restarts : times that the device's clock began anew
     clocked : whether the times are the device's own, and not fitted to the arrivals
+    since_power_on : whether the device's clock begins anew when it is switched on, so
+        that it shows every restart
     clock : the device's clock against the host's, None while it is not known
 
     """
@@ -102,6 +104,7 @@ class LinkHealth:
     repeated: int = 0
     restarts: int = 0
     clocked: bool = True
+    since_power_on: bool = False
     clock: ClockFit | None = None
 
 

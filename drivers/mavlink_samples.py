@@ -124,7 +124,7 @@ class MavlinkDecoder(Codec):
         self._waiting: list[tuple[Fields, Array]] = []
         span = 2.0**32 * self.kind.tick if self.kind.tick > 1e-6 else float("inf")
         resolution = self.kind.tick if self.kind.tick > 1e-6 else 0.0
-        self._clock = StampTimebase(self.health, resolution, span)
+        self._clock = StampTimebase(self.health, resolution, span, since_power_on=True)
         self._parser = dialect.MAVLink(None)
         self._broken = dialect.MAVError
         self._extras = np.full(max(dialect.mavlink_map) + 2, -1)

@@ -47,6 +47,13 @@ RATE_ERROR = 0.1
 DAY = 86400.0
 """Time after which a clock of the time of day begins again, s."""
 
+LEAST_SPAN = 3600.0
+"""Time in which a counter wraps, s, from which on it is seldom that a restart looks as
+if the counter had wrapped."""
+
+LONGEST_POWERED = 1e8
+"""Longest time that a device has been on, s. Larger stamps are those of a calendar."""
+
 FIRST_INTERVALS = 16
 """Intervals from which the period is first estimated."""
 
@@ -67,13 +74,21 @@ class StampTimebase:
     health : where gaps, missing and repeated samples and restarts are counted
     resolution : of the stamps, s
     span : time after which the counter wraps, s
+    since_power_on : whether the stamps count from when the device was switched on; not
+        where they are as large as those of a calendar
 
     """
 
     def __init__(
-        self, health: LinkHealth, resolution: float = 0.0, span: float = float("inf")
+        self,
+        health: LinkHealth,
+        resolution: float = 0.0,
+        span: float = float("inf"),
+        *,
+        since_power_on: bool = False,
     ) -> None:
         self._health = health
+        self._since_power_on = since_power_on and span >= LEAST_SPAN
         self._resolution, self._span = resolution, span
         self._offset = 0.0
         self._t = self._stamp = self._host = self._period = _NAN
@@ -175,6 +190,7 @@ class StampTimebase:
         self._count, self._renewal, self._early = 0, FIRST_INTERVALS, []
         self._stamp, self._host = stamp, host
         self._first_host = host
+        self._health.since_power_on = self._since_power_on and stamp < LONGEST_POWERED
         self._anchor()
 
     def _passed(self, host: float) -> tuple[float, float]:

@@ -99,7 +99,9 @@ class TextCodec(Codec):
         stated = resolution > 0 or options.text("t_resolution")
         self._resolution = None if stated else StampResolution()
         span = 2**bits * self._t_unit if bits else float("inf")
-        self._clock = ChosenTimebase(self.health, options, resolution, span)
+        self._clock = ChosenTimebase(
+            self.health, options, resolution, span, since_power_on=counter > 0
+        )
         self._whole = self._checked
         self._seq = SampleCounter()
         self._check()

@@ -85,7 +85,7 @@ class VectornavCodec(Codec):
             "source", ("uncompensated", "compensated"), "uncompensated"
         )
         self._pairs = COMPENSATED if source == "compensated" else UNCOMPENSATED
-        self._clock = ChosenTimebase(self.health, options)
+        self._clock = ChosenTimebase(self.health, options, since_power_on=True)
 
     def scan(self, data: Bytes) -> FrameCandidates:
         """Every 0xFA that a possible header follows."""

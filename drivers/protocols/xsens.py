@@ -65,7 +65,9 @@ class XsensCodec(Codec):
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)
-        self._clock = ChosenTimebase(self.health, options, span=2**32 * TICK)
+        self._clock = ChosenTimebase(
+            self.health, options, span=2**32 * TICK, since_power_on=True
+        )
         self._seq = SampleCounter(span=2**16)
 
     def scan(self, data: Bytes) -> FrameCandidates:

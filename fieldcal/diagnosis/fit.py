@@ -14,9 +14,10 @@ from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.change_points import change_points
 from fieldcal.model.rows.noise import rounding_noise
+from fieldcal.model.rows.possible_restarts import possible_restarts
 from fieldcal.model.rows.rest_onset import window_starts
 from fieldcal.model.rows.row_source import RowSource
-from fieldcal.model.rows.window_bounds import interruptions, window_bounds
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
@@ -40,7 +41,7 @@ def build_fit(prepared: PreparedRecording) -> GaussNewton:
     )  # fmt: skip
     dictionary.unfitted = tuple(factory_error_groups(dictionary, about, prepared))
     dictionary.add_instants(change_points(rows).tolist())
-    dictionary.expect_within(interruptions(source.block, about))
+    dictionary.expect_within(possible_restarts(source.block, about))
     grain = rounding_noise(source.block, window_bounds(source.block, about))
     rough = bool((grain[:, :3] > thresholds.ROUNDING_SHARE * rows.noise[:3]).any())
     # swaying is removed from windows and closures, but not from samples within turns

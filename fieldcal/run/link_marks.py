@@ -123,9 +123,11 @@ class LinkMarks:
     def _mark(self) -> None:
         now = self._counts()
         more = {k: n - self._before[k] for k, n in now.items() if n != self._before[k]}
-        where = {}
+        where: dict[str, Any] = {}
         if self._longest:
             where = {"from_s": round(self._from, 6), "to_s": round(self._to, 6)}
+        if where and self._driver.health.since_power_on and "restarts" not in more:
+            where["restarted"] = False
         self._recorder.mark("link", **where, **more)
         self._before, self._longest, self._marked = now, 0.0, monotonic()
 

@@ -58,6 +58,8 @@ class Description:
     position_numbers : index of each position in session.toml, from 0
     excluded_spans : (start, end) of samples that are excluded from the windows that
         contain them, s, in order
+    gaps_without_restart : (last, first) time of the samples around each gap through
+        which the device's clock, which begins anew at a restart, went on, s
 
     """
 
@@ -84,6 +86,7 @@ class Description:
     windows: tuple[tuple[float, float] | None, ...]
     position_numbers: tuple[int, ...]
     excluded_spans: tuple[tuple[float, float], ...]
+    gaps_without_restart: tuple[tuple[float, float], ...]
     raw: Mapping[str, Any] = field(repr=False)
 
     @property

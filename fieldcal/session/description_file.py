@@ -121,6 +121,7 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
         windows=windows,
         position_numbers=tuple(range(len(positions))),
         excluded_spans=excluded_spans(raw.get("position", ())),
+        gaps_without_restart=(),
         raw=raw,
     )
 

@@ -40,7 +40,12 @@ from fieldcal.session.installed_calibration import (
     nominal_as_sent,
     under_last_calibration,
 )
-from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
+from fieldcal.session.marks import (
+    MARKS,
+    POSITION_ADDED,
+    gaps_without_restart,
+    read_marks,
+)
 from fieldcal.session.position_tables import parse_positions
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
@@ -217,6 +222,7 @@ class Session:
             self.about,
             windows=tuple(w and moved(w) for w in self.about.windows),
             excluded_spans=tuple(map(moved, self.about.excluded_spans)),
+            gaps_without_restart=tuple(map(moved, self.about.gaps_without_restart)),
         )
         return steady
 
@@ -277,4 +283,9 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
         for start, end in mark.get("without_s", ())
     ]
     without = tuple(sorted((*about.excluded_spans, *gaps)))
-    return replace(about, windows=tuple(windows), excluded_spans=without)
+    return replace(
+        about,
+        windows=tuple(windows),
+        excluded_spans=without,
+        gaps_without_restart=tuple(gaps_without_restart(marks)),
+    )

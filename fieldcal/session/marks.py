@@ -55,6 +55,20 @@ def taken_windows(marks: Iterable[Mapping[str, Any]]) -> dict[int, tuple[float, 
     return taken
 
 
+def gaps_without_restart(
+    marks: Iterable[Mapping[str, Any]],
+) -> Iterator[tuple[float, float]]:
+    """Last time before and first after gaps in which the device did not restart, s.
+
+    >>> gap = {"event": "link", "from_s": 3.0, "to_s": 5.5}
+    >>> list(gaps_without_restart([gap, gap | {"restarted": False}]))
+    [(3.0, 5.5)]
+    """
+    for mark in marks:
+        if mark.get("event") == "link" and mark.get("restarted") is False:
+            yield float(mark["from_s"]), float(mark["to_s"])
+
+
 def insisted_positions(marks: Iterable[Mapping[str, Any]]) -> dict[int, str]:
     """Positions that the operator accepted though they looked wrong, and what did."""
     insisted: dict[int, str] = {}

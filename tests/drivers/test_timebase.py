@@ -337,3 +337,22 @@ def test_samples_that_overtake_each_other_are_no_wrap() -> None:
     made = StampTimebase(health, span=0.65536).times(stamps, np.ones(len(t)), 500.0 + t)
     assert made[-1] == pytest.approx(t[-1])
     assert health.repeated == 1
+
+
+@pytest.mark.parametrize(
+    ("first", "span", "since_power_on", "shown"),
+    [
+        (5.0, float("inf"), True, True),
+        (5.0, 4294.967296, True, True),
+        (5.0, float("inf"), False, False),
+        (1.7e9, float("inf"), True, False),  # seconds of the calendar
+        (5.0, 65.536, True, False),  # a restart may look like a wrap
+    ],
+)
+def test_a_clock_since_power_on_shows_every_restart(
+    first: float, span: float, since_power_on: bool, shown: bool
+) -> None:
+    health = LinkHealth()
+    clock = StampTimebase(health, span=span, since_power_on=since_power_on)
+    placed(clock, first + np.arange(40) * 0.01)
+    assert health.since_power_on is shown

@@ -1,9 +1,7 @@
-"""Bounds of each position's window, of the blocks in it, and gaps between windows.
+"""Bounds of each position's window, and of the blocks in it.
 
 Blocks are a second long, and longer ones later in the window when there are many
-seconds: what happens after a turn happens at the start. Where samples are missing
-between two positions, the device may have restarted, with other biases; between
-positions, a restart shows only as a gap.
+seconds: what happens after a turn happens at the start.
 """
 
 from __future__ import annotations
@@ -13,7 +11,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from fieldcal.core.samples import Array, Block, Index
-from fieldcal.core.sampling import sampling_rate
 from fieldcal.session.description import Description
 
 TARGET_ROWS = 360
@@ -24,9 +21,6 @@ MIN_WINDOW_ROWS, MAX_WINDOW_ROWS = 8, 120
 
 FIRST_S = 1.0
 """Length of the first row of a window, in which settling changes fastest, s."""
-
-MIN_INTERRUPTION_S, MIN_INTERRUPTION_PERIODS = 0.5, 5.0
-"""Time, and periods of the samples, without any in which a device may restart."""
 
 
 def window_bounds(block: Block, about: Description) -> Index:
@@ -92,17 +86,3 @@ def block_bounds(
     for a, b in gaps:
         keep &= (grid[1:] <= a) | (grid[:-1] >= b)
     return np.column_stack([at[:-1][keep], at[1:][keep]])
-
-
-def interruptions(block: Block, about: Description) -> list[tuple[float, float]]:
-    """End of the position before and start of the one after each gap, s."""
-    bound = window_bounds(block, about)
-    held = bound[bound[:, 1] > bound[:, 0]]
-    held = held[np.argsort(held[:, 0])]
-    least = max(MIN_INTERRUPTION_S, MIN_INTERRUPTION_PERIODS / sampling_rate(block))
-    out = []
-    for (_, end), (start, _) in zip(held[:-1], held[1:], strict=True):
-        between = block.t[max(end - 1, 0) : start + 1]
-        if len(between) > 1 and np.diff(between).max() > least:
-            out.append((float(between[0]), float(between[-1])))
-    return out

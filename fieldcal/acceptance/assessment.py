@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.acceptance.bias_removal import BiasSpread
+from fieldcal.acceptance.bias_cases import BiasSpread
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
 from fieldcal.acceptance.family_at_temperature import (
     FamilyAtTemperature,

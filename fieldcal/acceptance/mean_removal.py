@@ -35,10 +35,10 @@ from math import e, erf, log, pi, sqrt
 
 import numpy as np
 
+from fieldcal.acceptance.bias_cases import BiasSpread
 from fieldcal.acceptance.bias_removal import (
     DOUBT,
     UNKNOWN,
-    BiasSpread,
     bias_removal_probability,
     chance_near_zero,
     chi2_about_zero,
@@ -70,15 +70,13 @@ def removed_bias_sentences(
 
     """
     said = []
-    removes, what = bias_removal_probability(
-        windows, block, repeat[1], least, gyro_biases
-    )
+    removes, what = bias_removal_probability(windows, block, repeat[1], gyro_biases)
     if removes > DOUBT:
         said.append(
-            "the gyroscopes' means at rest are zero within their noise, with neither a"
-            f" bias nor the Earth's rate in them {what}: the device removes its bias"
-            " at rest, so the recording does not contain it; switch this off (gyro"
-            " bias estimation, auto calibration, zero velocity update) and record"
+            "the gyroscopes' rates at rest are zero within their noise or return to"
+            f" zero, so that no bias stays in them ({what}): the device removes its"
+            " bias at rest, so the recording does not contain it; switch this off"
+            " (gyro bias estimation, auto calibration, zero velocity update) and record"
             " again"
         )
     odd = [name for name, p in mean_probabilities(block) if p < least]

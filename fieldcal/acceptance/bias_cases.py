@@ -1,0 +1,125 @@
+"""What devices may do to the biases of their gyroscopes, and how likely each is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from fieldcal.acceptance.tracked_bias import CASE, Cases
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array
+
+DEPENDENCE = (0.0, 0.01, 0.03, 0.1, 0.3)
+"""Dependence of gyroscopes on the position, mostly g-sensitivity, as part of the spread
+of their biases; all are equally likely. The Earth's rate is added except for the first,
+as in a simulation."""
+
+CALIBRATED, CALIBRATED_SHARE = 0.1, 0.1
+"""Spread of biases that were calibrated before, as part of the usual one, and the share
+of devices with such."""
+
+UNBIASED_SHARE = 0.01
+"""Share of devices whose bias is known, so that only the Earth's rate stays."""
+
+WALKS = (0.0, 1e-3, 1e-2, 1e-1)
+"""Slow changes of a bias in `WALK_S`, as parts of the spread from run to run."""
+
+EARTH = EARTH_RATE**2 / 3
+"""Variance of the Earth's rate about an axis, (rad/s)^2."""
+
+WALK_S = 30.0
+"""Time of `WALKS`, s."""
+
+PUT_IN = (0.0, 0.1, 1.0)
+"""What a turn puts into the bias that is subtracted, as parts of the same spread."""
+
+TIME_CONSTANTS = np.geomspace(0.25, 512.0, 12)
+"""Time constants with which a bias may be followed, s."""
+
+AVERAGES = np.geomspace(0.25, 16.0, 13)
+"""Times over which it may be averaged, s."""
+
+SETTLES_S, SETTLES_PART = 0.5, 1.2
+"""Time after a turn from which an average is subtracted: s, and in times of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class BiasSpread:
+    """Possible biases of gyroscopes from which none is subtracted.
+
+    Attributes
+    ----------
+    repeat : spread from run to run, 1 sigma, rad/s
+    averaged : whether the device reports a constant offset that it subtracts
+
+    """
+
+    repeat: float
+    averaged: bool = False
+
+
+def followed_cases(keeps: BiasSpread, density: Array) -> Cases:
+    """Cases in which the bias is followed, behind noise of (a,) (rad/s)^2 s."""
+    usual, psd = keeps.repeat**2, float(density.mean())
+    return _cases(
+        (tau, start, w, part**2 * usual, walk, 0.0)
+        for tau, w, part, walk in product(
+            TIME_CONSTANTS, _felt(keeps), PUT_IN, _walks(keeps)[:2]
+        )
+        for start in (usual, w + psd)  # the latter if it has rested for a second
+    )
+
+
+def averaged_cases(density: Array) -> Cases:
+    """Cases in which a mean is subtracted until the next turn, one for each time."""
+    psd = float(density.mean())
+    return _cases(
+        (np.inf, 0.0, psd / s, 0.0, 0.0, SETTLES_PART * s + SETTLES_S) for s in AVERAGES
+    )
+
+
+def kept_cases(keeps: BiasSpread, density: Array, blind: float) -> Cases:
+    """Cases in which the bias is kept, of which a time after each turn is not used."""
+    usual, small = keeps.repeat, CALIBRATED * keeps.repeat
+    starts = [(usual**2, 1 - CALIBRATED_SHARE), (small**2, CALIBRATED_SHARE)]
+    if keeps.averaged:
+        left = [float(density.mean() / s) for s in AVERAGES]
+        starts = [(start, share / 2) for start, share in starts]
+        starts += [(var, 0.5 / len(left)) for var in left]
+    rows = [
+        ((np.inf, start, w, 0.0, walk, blind), share)
+        for (start, share), w, walk in product(starts, _felt(keeps), _walks(keeps))
+    ]
+    cases = _cases(row for row, _ in rows)
+    weights = np.array([share for _, share in rows])
+    cases["share"] = (1 - UNBIASED_SHARE) * weights / weights.sum()
+    unbiased = _cases((np.inf, 0.0, EARTH, 0.0, w, blind) for w in _walks(keeps)[:2])
+    unbiased["share"] *= UNBIASED_SHARE
+    return np.concatenate([cases, unbiased])
+
+
+def way_of_removal(case: Cases) -> str:
+    """How a device of a case removes its bias, in words."""
+    if np.isfinite(case["tau"]):
+        return f"with a time constant of about {case['tau']:.2g} s"
+    average = (case["blind"] - SETTLES_S) / SETTLES_PART
+    return f"as a mean over about {average:.2g} s after each turn"
+
+
+def _cases(rows: Iterable[tuple[float, ...]]) -> Cases:
+    """Equally likely cases from rows of their values."""
+    every = [tuple(map(float, row)) for row in rows]
+    return np.array([(*row, 1 / len(every)) for row in every], dtype=CASE)
+
+
+def _walks(keeps: BiasSpread) -> list[float]:
+    """Variances by which a bias may change in a second."""
+    return [(part * keeps.repeat) ** 2 / WALK_S for part in WALKS]
+
+
+def _felt(keeps: BiasSpread) -> list[float]:
+    """Variances of the rate that a gyroscope feels by how the device lies."""
+    return [(d * keeps.repeat) ** 2 + (EARTH if d else 0.0) for d in DEPENDENCE]

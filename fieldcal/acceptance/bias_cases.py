@@ -21,14 +21,8 @@ CALIBRATED, CALIBRATED_SHARE = 0.1, 0.1
 """Spread of biases that were calibrated before, as part of the usual one, and the share
 of devices with such."""
 
-UNBIASED_SHARE = 0.01
-"""Share of devices whose bias is known, so that only the Earth's rate stays."""
-
 WALKS = (0.0, 1e-3, 1e-2, 1e-1)
 """Slow changes of a bias in `WALK_S`, as parts of the spread from run to run."""
-
-EARTH = EARTH_RATE**2 / 3
-"""Variance of the Earth's rate about an axis, (rad/s)^2."""
 
 WALK_S = 30.0
 """Time of `WALKS`, s."""
@@ -95,10 +89,8 @@ def kept_cases(keeps: BiasSpread, density: Array, blind: float) -> Cases:
     ]
     cases = _cases(row for row, _ in rows)
     weights = np.array([share for _, share in rows])
-    cases["share"] = (1 - UNBIASED_SHARE) * weights / weights.sum()
-    unbiased = _cases((np.inf, 0.0, EARTH, 0.0, w, blind) for w in _walks(keeps)[:2])
-    unbiased["share"] *= UNBIASED_SHARE
-    return np.concatenate([cases, unbiased])
+    cases["share"] = weights / weights.sum()
+    return cases
 
 
 def way_of_removal(case: Cases) -> str:
@@ -122,4 +114,5 @@ def _walks(keeps: BiasSpread) -> list[float]:
 
 def _felt(keeps: BiasSpread) -> list[float]:
     """Variances of the rate that a gyroscope feels by how the device lies."""
-    return [(d * keeps.repeat) ** 2 + (EARTH if d else 0.0) for d in DEPENDENCE]
+    earth = EARTH_RATE**2 / 3
+    return [(d * keeps.repeat) ** 2 + (earth if d else 0.0) for d in DEPENDENCE]

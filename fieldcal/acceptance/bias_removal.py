@@ -25,7 +25,8 @@ Cases are time constants, what turns put into the estimate, the dependence of w 
 the device lies, and slow changes of the bias (`bias_cases`). A bias that is kept has a
 spread of s_b. A few devices had theirs calibrated before, so that no rates are taken
 for those of a device that removes its bias only because they are small: they must also
-return to zero, or be smaller than the Earth's rate.
+return to zero, or be smaller than the Earth's rate. Of a share UNBIASED the bias is
+known: only the Earth's rate stays (`earth_rate_alone`).
 
 A device may also subtract the mean of its first T seconds at rest until the next turn.
 After that, its rates are the noise of the mean, of another value after each turn,
@@ -53,6 +54,7 @@ from fieldcal.acceptance.bias_cases import (
     kept_cases,
     way_of_removal,
 )
+from fieldcal.acceptance.earth_rate_alone import earth_rate_alone
 from fieldcal.acceptance.rest_steps import (
     SPECTRUM,
     RestStep,
@@ -71,6 +73,9 @@ MIN_WINDOWS = 2
 
 TRACKING = 0.01
 """Share of devices that subtract their bias at rest; low-cost ones often do."""
+
+UNBIASED = 0.01
+"""Share of gyroscopes of known bias, as of a simulation."""
 
 DOUBT = 0.1
 """Probability of such a device above which there is no GO."""
@@ -124,8 +129,8 @@ def _removal_behind_noise(
     kinds = [followed_cases(keeps, density), *np.split(averaged, len(averaged))]
     rivals = [kept_cases(keeps, density, float(kind["blind"][0])) for kind in kinds]
     found = _LogEvidence.of(steps, density, keeps, [*kinds, *rivals])
-    count = len(kinds)
-    ratios = [found.log_ratio(i, count + i) for i in range(count)]
+    alone = [earth_rate_alone(steps, density, float(k["blind"][0])) for k in kinds]
+    ratios = [found.log_ratio(i, len(kinds) + i, one) for i, one in enumerate(alone)]
     share = np.array([1.0] + [1 / len(averaged)] * len(averaged)) / 2
     every = np.array(ratios) + np.log(share)  # (3), (4)
     chance = float(probability_of_log_odds(np.logaddexp.reduce(every) + prior))
@@ -164,8 +169,10 @@ class _LogEvidence:
         means = [float(part[0]) for part in np.split(count, ends)]
         return cls(groups, np.split(logs, ends), np.split(chi2, ends), means)
 
-    def log_ratio(self, group: int, other: int) -> float:
-        """Log of the ratio of two groups' likelihoods.
+    def log_ratio(self, group: int, other: int, unbiased: float) -> float:
+        """Log of the ratio of two groups' likelihoods, the latter with UNBIASED.
+
+        `unbiased` is the log likelihood of gyroscopes of known bias.
 
         What neither explains, such as a knock, does not tell them apart: the log is
         divided by the chi-squared of a mean.
@@ -173,7 +180,8 @@ class _LogEvidence:
         best = min(float(self.chi2[g][np.argmax(self.logs[g])]) for g in (group, other))
         excess = max(1.0, best / max(self.means[group], 1.0))
         a, b = (np.logaddexp.reduce(self.logs[g]) for g in (group, other))
-        return float((a - b) / excess)
+        kept = np.logaddexp(b + np.log1p(-UNBIASED), unbiased + np.log(UNBIASED))
+        return float((a - kept) / excess)
 
     def likeliest(self, group: int) -> Cases:
         """The likeliest case of a group."""

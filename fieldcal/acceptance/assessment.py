@@ -17,6 +17,7 @@ import numpy as np
 
 from fieldcal.acceptance.bias_cases import BiasSpread
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
+from fieldcal.acceptance.exchange import exchange_text
 from fieldcal.acceptance.family_at_temperature import (
     FamilyAtTemperature,
     family_at_temperature,
@@ -88,6 +89,7 @@ def assess(
             *insistence_doubts(marks),
             *broken_axis_messages(session.block.six),
             *_removed_biases(calibration, session, windows, limits),
+            *_exchanges(calibration, session, windows, limits),
         ],
         windows=windows.at_rest(session).averages,
         position_numbers=windows.position_numbers,
@@ -180,6 +182,7 @@ def with_faults(
     ]
     wrong += [bias_jump_warning(calibration, limits)]
     wrong += _removed_biases(calibration, session, windows, limits)
+    wrong += _exchanges(calibration, session, windows, limits)
     wrong = [w for w in wrong if w]
     warnings = (*wrong, *calibration.warnings, *filter(None, unknown))
     return replace(calibration, warnings=warnings, good=calibration.good and not wrong)
@@ -214,6 +217,18 @@ def _undetermined_by_omission(
         f"{which} left out; without {them} {join_words(lost)} {verb} not determined:"
         f" record {them} again"
     )
+
+
+def _exchanges(
+    calibration: Calibration,
+    session: Session,
+    windows: UsableWindows,
+    limits: GradeLimits,
+) -> list[str]:
+    """Sentence if another device seems to follow from some time on."""
+    held = windows.at_rest(session).averages
+    said = exchange_text(calibration, session.block, held, limits)
+    return [said] if said else []
 
 
 def _removed_biases(

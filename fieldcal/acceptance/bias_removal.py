@@ -80,6 +80,10 @@ UNBIASED = 0.01
 DOUBT = 0.1
 """Probability of such a device above which there is no GO."""
 
+LEAST_NOISE = 1e-4
+"""Least noise of a mean over a second, as part of the spread of biases: where steps are
+coarse and there is hardly any noise, rounding errs by more than this."""
+
 MOVED, MOVED_S = 2e-3, 0.25
 """Spread of mean rates over so long, rad/s and s, beyond which a device moves: 0.1
 deg/s. A hand makes 5e-3 to 2e-2, and noise of a low-cost gyroscope at rest 6e-4."""
@@ -123,7 +127,8 @@ def _removal_behind_noise(
     seen = np.isfinite(noise)
     if seen.sum() < len(axes) * MIN_WINDOWS or not seen.any(axis=0).all():
         return 0.0, ""
-    density = np.nanmedian(noise, axis=0) ** 2 * sample_period(held[0])
+    of_second = np.nanmedian(noise, axis=0) * np.sqrt(sample_period(held[0]))
+    density = np.maximum(of_second, LEAST_NOISE * keeps.repeat) ** 2
     steps = rest_steps(held, block, axes, noise)
     averaged = averaged_cases(density)
     kinds = [followed_cases(keeps, density), *np.split(averaged, len(averaged))]

@@ -324,6 +324,16 @@ def test_means_of_exactly_zero_are_no_fault_of_the_check() -> None:
     assert 0.0 <= bias_removal_probability(windows, block, KEEPS)[0] <= 1.0
 
 
+def test_steps_with_hardly_any_noise_are_no_fault_of_the_check() -> None:
+    """Noise of a millionth of the bias; or one sample in a thousand a step higher."""
+    windows, block = at_rest(np.random.default_rng(24), 0.0)
+    block.gyr[:] = 1e-3 + 1e-9 * np.random.default_rng(25).standard_normal((18_000, 3))
+    assert bias_removal_probability(windows, block, KEEPS)[0] < 0.01
+    block.gyr[:] = 1e-3
+    block.gyr[:] += 1e-6 * (np.random.default_rng(26).random((18_000, 3)) < 1e-3)
+    assert 0.0 <= bias_removal_probability(windows, block, KEEPS)[0] < 0.01
+
+
 @pytest.mark.parametrize("trembles", [False, True])
 def test_a_hand_hides_a_small_bias_and_never_rests(trembles: bool) -> None:
     """Of a gyroscope of 1e-4 rad/s; the same means at rest are those of a device that

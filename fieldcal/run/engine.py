@@ -23,7 +23,6 @@ from fieldcal.core.positions import Position
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Add, Hold, Judge, Note, Plan, Repeat, Step
-from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.incoming import SILENCES_UNTIL_TOLD, IncomingSamples
 from fieldcal.run.interruptions import (
     WindowDisturbed,
@@ -32,7 +31,6 @@ from fieldcal.run.interruptions import (
     restart_notice,
 )
 from fieldcal.run.link_marks import MarkedRecorder
-from fieldcal.run.mixed_devices_watch import MixedDevicesWatch
 from fieldcal.run.operator.desk import (
     OperatorDesk,
     confirmation_question,
@@ -40,11 +38,11 @@ from fieldcal.run.operator.desk import (
 )
 from fieldcal.run.operator.protocol import Display, Operator
 from fieldcal.run.position_check import AcceptedPosition
+from fieldcal.run.sample_watches import SampleWatches
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait, measured_force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.run.window_taking import WindowTaker
-from fieldcal.run.zero_rates_watch import ZeroRatesWatch
 from fieldcal.session.description import Description
 from fieldcal.session.marks import POSITION_ADDED
 from fieldcal.session.position_tables import position_table
@@ -110,11 +108,7 @@ class Engine:
         self._hold_now: Hold | None = None
         self._before: int | None = None
         self._restarts = driver.health.restarts
-        self._units = GyroUnitWatch(about.gravity)
-        self._mixed = MixedDevicesWatch()
-        stated = bool(driver.notes.get("installed"))
-        self._zero_rates = ZeroRatesWatch(about.grade, stated)
-        self._warned = set[tuple[int, str]]()
+        self._watches = SampleWatches(driver, about)
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver, self._left_out)
         self._incoming = IncomingSamples(
@@ -247,9 +241,8 @@ class Engine:
             try:
                 average = self._windows.average(hold, pieces)
                 if average is not None:
-                    self._zero_rates.add_window(average)
+                    self._watches.add_window(average)
                     self._warn_if_warming_up()
-                    self._warned.clear()  # what was said of a turn is gone
                     self._warn_of_samples(hold)
                 return average
             except WindowDisturbed as disturbed:
@@ -268,8 +261,7 @@ class Engine:
 
     def _on_piece(self, piece: Block) -> None:
         """Look at a short stretch of samples, however long the block that it is of."""
-        self._units.add(piece)
-        self._mixed.add(piece)
+        self._watches.add(piece)
         if self._warm_up:
             self._warm_up.add(piece)
 
@@ -287,7 +279,7 @@ class Engine:
         """Wait until the device rests where it should."""
         left = self._windows.disturbed_index == hold.index
         waiting = PositionWait(
-            hold, self._about, self._held, left, self._units, self._doubted
+            hold, self._about, self._held, left, self._watches.units, self._doubted
         )
         asked = self._driver.host_time()
         insisted = warned = False
@@ -320,7 +312,7 @@ class Engine:
             self._display.show_turning(hold, waiting, reason)
             shown = reason.state
             if waiting.arrived:
-                self._zero_rates.add_rest(waiting.rates_at_rest)
+                self._watches.add_rest(waiting.rates_at_rest)
             self._warn_of_samples(hold)
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
@@ -332,11 +324,8 @@ class Engine:
 
     def _warn_of_samples(self, hold: Hold) -> None:
         """Say once a position what is wrong with the samples: a unit, two devices."""
-        watches = (self._units, self._mixed, self._zero_rates)
-        for notice in (watch.notice for watch in watches):
-            if notice and (hold.index, notice) not in self._warned:
-                self._warned.add((hold.index, notice))
-                self._desk.tell(notice)
+        for notice in self._watches.new_notices(hold.index):
+            self._desk.tell(notice)
 
     def _report_wrong_place(
         self, hold: Hold, waiting: PositionWait, quiet: bool

@@ -1,0 +1,29 @@
+"""What is wrong with samples is said once a position, and again after the next turn."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+
+from fieldcal.drivers.driver import Driver
+from fieldcal.run.sample_watches import SampleWatches
+from fieldcal.session.description_file import parse_description
+from fieldcal.windows import Average
+
+
+def test_a_notice_is_said_once_a_position_until_a_window_is_taken() -> None:
+    device = cast(Driver, SimpleNamespace(notes={}))
+    watches = SampleWatches(device, parse_description({}))
+    noise = 2e-3 * np.random.default_rng(1).standard_normal((100, 3))
+    assert [*watches.new_notices(0)] == []
+    watches.add_rest(noise - noise.mean(axis=0))
+    (said,) = watches.new_notices(0)
+    assert "zero" in said
+    assert [*watches.new_notices(0)] == []
+    assert [*watches.new_notices(1)] == [said]
+    zero = np.array([0.0, -9.81, 0.0, 0.0, 0.0, 0.0])
+    spread = np.diag([1e-6] * 3 + [2.5e-9] * 3)
+    watches.add_window(Average(zero, spread, 20.0, 3000, 0.0, 30.0))
+    assert [*watches.new_notices(1)] == [said]

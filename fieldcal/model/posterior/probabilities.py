@@ -23,6 +23,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.search.offers import Offer
+from fieldcal.model.search.restarts import visit_restart
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.variations import ALTERNATIVE_MARGIN, visit_variations
 
@@ -79,6 +80,7 @@ class Posterior:
             if visited.score > best.score - MAX_LOG_DISTANCE:
                 visit_variations(self.sets, visited, best.score)
         self._visit_likely_additions()
+        visit_restart(self.sets, best)
 
     def _visit_likely_additions(self) -> None:
         """Visit the best set with each further cause that is likely enough.

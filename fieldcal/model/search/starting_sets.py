@@ -6,7 +6,7 @@ state by much may look unlikely there, and is tried about its own state as well.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -15,15 +15,15 @@ from fieldcal.core.samples import GYR
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Gram
-from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.gauss_newton import GaussNewton
+from fieldcal.model.search.restarts import sets_with_restarts
 from fieldcal.model.search.selection import Search
 from fieldcal.model.search.variations import score_of
 from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.physics.attitude_step import AttitudeStep
-from fieldcal.physics.effect import BiasChange
 
 LARGE_INSTABILITY = 4.0
 """Instability, in typical ones, above which causes may hide that show only together."""
@@ -37,7 +37,9 @@ def starting_sets(fit: GaussNewton, search: Search, best: Set) -> Iterator[Set]:
     yield from sets_with_large_turns(search)
     if elsewhere := _positions_elsewhere(fit):
         yield search.sets.evaluate(elsewhere)
-    yield from _restarts(search.sets)
+    nothing = search.sets.evaluate(())
+    if restarts := sets_with_restarts(search.sets, nothing):
+        yield max(restarts, key=score_of)
     usual = tuple((c, c.variants[0]) for c in fit.dictionary.causes if c.usual)
     keys = {c.key for c, _ in usual}
     instability = priors.SIZES[list(best.sizes.instability)]
@@ -100,31 +102,6 @@ def _positions_elsewhere(fit: GaussNewton) -> tuple[Member, ...]:
     if 2 * len(far) >= len(causes):  # then the device is what is different
         return ()
     return tuple((c, c.variants[0]) for c in far)
-
-
-def _restarts(sets: Sets) -> Iterator[Set]:
-    """The set in which all biases jump in the likeliest of the gaps, if there is one.
-
-    Step by step it is not found where something else, such as wrong angles, explains
-    the jump of one triad: beside that, no row needs the jump.
-    """
-    jumps: dict[float, dict[Cause, list[Group]]] = {}
-    for cause in sets.dictionary.causes:
-        for group in cause.variants:
-            if group in cause.expected and isinstance(group.effect, BiasChange):
-                (at_s,) = group.shape.values()
-                jumps.setdefault(at_s, {}).setdefault(cause, []).append(group)
-    if jumps:
-        yield max((_likeliest_sizes(sets, one) for one in jumps.values()), key=score_of)
-
-
-def _likeliest_sizes(sets: Sets, jumps: Mapping[Cause, Sequence[Group]]) -> Set:
-    """The set of some causes with the likeliest group of each, one after the other."""
-    best = sets.evaluate(())
-    for cause, groups in jumps.items():
-        each = (sets.evaluate((*best.members, (cause, group))) for group in groups)
-        best = max(each, key=score_of)
-    return best
 
 
 def _turns_need_usual_causes(

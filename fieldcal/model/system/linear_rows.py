@@ -41,6 +41,13 @@ class LinearRows:
             self.channel, rows, window, weight, self.columns, design, white
         )
 
+    def with_columns(self, more: LinearRows) -> LinearRows:
+        """The rows with columns more, those of the same rows in `more`."""
+        columns = np.concatenate([self.columns, more.columns])
+        return replace(
+            self, columns=columns, design=np.hstack([self.design, more.design])
+        )
+
     def select_columns(self, columns: Mask) -> LinearRows:
         """The rows with only some columns, (all,) of the dictionary."""
         kept = columns[self.columns]
@@ -63,6 +70,6 @@ class LinearRows:
 
     def window_means(self, white: Array) -> Array:
         """Weighted mean of each window, (w, ...), of whitened rows (r, ...)."""
-        weight = self.weight.reshape(-1, *[1] * (white.ndim - 1))
-        total = np.add.reduceat(white * weight, self.starts, axis=0)
-        return total / self.info.reshape(-1, *[1] * (white.ndim - 1))
+        inside = self.windows[:, None] == self.window
+        share: Array = inside * self.weight / self.info[:, None]
+        return share @ white

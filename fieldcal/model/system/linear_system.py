@@ -53,22 +53,30 @@ class System(ABC):
 
     def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
-        table_of, off = self._about(state)
         asked = self._every_column() if wanted is None else wanted
-        out = [
+        out = self._with_columns(state, asked)
+        if wanted is None:
+            self._note_shown(out)
+        return out
+
+    def _with_columns(self, state: State, wanted: Mask) -> list[LinearRows]:
+        """Rows of the channels that wanted columns have influence on."""
+        table_of, off = self._about(state)
+        return [
             self._whitened(
                 c,
                 np.concatenate([at for at, _ in parts]),
                 np.hstack([table for _, table in parts]),
                 off[:, c],
             )
-            for c, parts in self._parts(table_of, asked).items()
+            for c, parts in self._parts(table_of, wanted).items()
             if parts
         ]
-        if wanted is None:
-            for part in out:
-                self.dictionary.shown[part.columns] |= self._shows(part)
-        return out
+
+    def _note_shown(self, linear: Sequence[LinearRows]) -> None:
+        """Note which columns rows show, in the dictionary."""
+        for part in linear:
+            self.dictionary.shown[part.columns] |= self._shows(part)
 
     @abstractmethod
     def _about(self, state: State) -> tuple[Callable[[Basis], Array], Array]:
@@ -104,9 +112,9 @@ class System(ABC):
                 continue
             if not kept.all():
                 at, table = at[kept], table[:, :, kept]
+            touched = ((table != 0.0) & used[:, :, None]).any(axis=0)
             for c, channel_parts in parts.items():
-                shown = ((table[:, c] != 0.0) & used[:, c, None]).any(axis=0)
-                if shown.any():
+                if (shown := np.flatnonzero(touched[c])).size:
                     channel_parts.append((at[shown], table[:, c, shown]))
         return parts
 

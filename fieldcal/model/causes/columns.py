@@ -118,7 +118,7 @@ def attitude(view: RowView) -> Array:
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 3 * places))
     held = np.flatnonzero(view.nominal.position >= 0)
-    axes = np.swapaxes(view.x.to_device[held], 1, 2)  # of the base, in device axes
+    axes = np.swapaxes(view.x.to_device_in(held), 1, 2)  # of the base, in device axes
     at = 3 * view.nominal.position[held]
     for i in range(3):
         change = [np.cross(v[held], axes[:, i]) for v in (view.x.f, view.x.w)]

@@ -13,14 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.cause import Basis
-from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
 from fieldcal.model.system.end_columns import EndColumns
-from fieldcal.model.system.turn_force_rows import turn_force_columns
 from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.experience_rows import concatenate_rows
@@ -77,17 +74,12 @@ class TurnColumns:
         if self.way:
             self.general.append((index, outputs))
 
-    def during_turn(
-        self, dictionary: Dictionary, known: Set
-    ) -> list[tuple[Index, Array]]:
-        """The `general` columns that accelerometers during the turn may determine.
-
-        Those that no window shows, and those that the windows' set `known` has.
-        """
+    def during_turn(self, used: Mask) -> list[tuple[Index, Array]]:
+        """The `general` columns that are `used` during the turn, (all,)."""
         out = []
         for index, outputs in self.general:
-            used = turn_force_columns(index, dictionary, known)
-            out.append((index[used], outputs[:, :, used]))
+            if (kept := used[index]).any():
+                out.append((index[kept], outputs[:, :, kept]))
         return out
 
 

@@ -27,7 +27,11 @@ from fieldcal.model.rows.hand_tremor import turned_force
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.turn_columns import ColumnsOfTurns, TurnColumns
-from fieldcal.model.system.turn_force_rows import TurnForceRows, settling_amplitudes
+from fieldcal.model.system.turn_force_rows import (
+    TurnForceRows,
+    settling_amplitudes,
+    turn_force_columns,
+)
 from fieldcal.model.system.window_ends import WindowEnds, closure_slopes, output_slopes
 from fieldcal.model.turns.attitude import turn_geometry
 from fieldcal.model.turns.turn import Turn
@@ -111,6 +115,8 @@ class Turns:
         """
         seen = self.way and known is not None and not _has_unknown_acc_cause(known)
         self.known = self._with_factory_errors(known) if known and seen else None
+        if self.known is not None:
+            self.used = turn_force_columns(self.dictionary, self.known)
         unoriented = bool(self.dictionary.unoriented.any())
         if unoriented:
             self.windows = WindowEnds.of(windows, self.dictionary)
@@ -173,7 +179,7 @@ class Turns:
             turn.ends, turn.positions, turn.attitude, turn.done
         )
         index, close = met.index, met.closing
-        general = met.during_turn(d, self.known) if self.known is not None else []
+        general = met.during_turn(self.used) if self.known is not None else []
         loose: dict[int, Array] = {}
         if d.unoriented.any():
             loose = dict(closure_slopes(turn, d.window_positions, self.slopes))

@@ -122,7 +122,7 @@ def closure_slopes(
     """
     ends = turn.ends
     rows = first_row_of_each(ends, turn.positions)
-    forces, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
+    forces, held = ends.f[rows], np.repeat(ends.to_device_in(rows)[None], 3, axis=0)
     for i, p in enumerate(turn.positions):
         j = int(np.searchsorted(positions, p))
         up = forces[i] / np.linalg.norm(forces[i])

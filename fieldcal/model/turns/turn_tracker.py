@@ -185,7 +185,7 @@ class TurnTracker:
         attitude, done = integrated.attitude, integrated.done
         f, _, _ = turn_geometry(ends, pair, attitude, done)
         w = integrated.rate[steps.edge]
-        held = ends.to_device[first_row_of_each(ends, pair)]
+        held = ends.to_device_in(first_row_of_each(ends, pair))
         warming, heating = self.source.thermometer.at(t)
         unknown = np.full(len(t), np.nan)
         out = Experience.at_rest(

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed import kinds
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.basis import Course, RowView
-from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_columns import ColumnsOfTurns, TurnColumns
+from fieldcal.model.system.turn_force_rows import turn_force_columns
 from fieldcal.model.turns.turn import Turn
 from fieldcal.model.turns.turn_tracker import TurnTracker
 from fieldcal.physics.experience import Experience
@@ -50,7 +49,7 @@ def test_all_turns_at_once_are_each_by_itself() -> None:
         assert len(every) > 5 and all(met.general for met in every)
         for turn, view, met in zip(turns, views, every, strict=True):
             (alone,) = ColumnsOfTurns(state, [turn], [view], True).of_bases(*known)
-            assert_same_columns(met, alone, best, d)
+            assert_same_columns(met, alone, turn_force_columns(d, best))
     assert [t.effect.id for t in state.terms] == ["gyro_scale"]
 
 
@@ -88,12 +87,12 @@ def test_rows_about_the_same_state_are_linearised_once(
 
 
 def assert_same_columns(
-    one: TurnColumns, other: TurnColumns, known: Set, d: Dictionary
+    one: TurnColumns, other: TurnColumns, used: Mask
 ) -> None:
     np.testing.assert_array_equal(one.index, other.index)
     np.testing.assert_allclose(one.closing, other.closing, rtol=1e-12, atol=1e-300)
     for (columns, outputs), (own, alone) in zip(
-        one.during_turn(d, known), other.during_turn(d, known), strict=True
+        one.during_turn(used), other.during_turn(used), strict=True
     ):
         np.testing.assert_array_equal(columns, own)
         np.testing.assert_allclose(outputs, alone, rtol=1e-12, atol=1e-300)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -80,21 +81,13 @@ class Gram:
 
     def with_instability(self, tau: Array) -> WeightedGram:
         """Weight the means with instabilities by kind, (7,)."""
-        known = self.info > 0
         if self.free_rotations.any():
-            full, log_det = self.whitening(tau)
-            own = np.diagonal(np.swapaxes(full, 1, 2) @ full, 0, 1, 2)
-            return WeightedGram(
-                self, (full @ self.means)[known],
-                (full @ self.residual[:, :, None])[known, 0], own, full, float(log_det),
-            )  # fmt: skip
+            root, log_det = self.whitening(tau)
+            return WeightedGram(self, np.zeros(0), root, float(log_det))
         variance = self._shared_variance(tau)
         weight = self.info / (1 + self.info * variance)
         log_det = np.log1p(self.info * variance).sum()
-        root = np.sqrt(weight[known])
-        white: Array = self.means[known] * root[:, None]
-        residual: Array = self.residual[known] * root
-        return WeightedGram(self, white, residual, weight, np.zeros(0), float(log_det))
+        return WeightedGram(self, weight, np.zeros(0), float(log_det))
 
     def _shared_variance(self, tau: Array) -> Array:
         """Variance of the means in addition to white noise, by channel, (..., p, 6).
@@ -105,6 +98,20 @@ class Gram:
         closures = np.einsum("pij,...j->...pi", self.closure_errors**2, square[..., :6])
         out: Array = self.shared**2 + square[..., self.kind] + closures
         return out
+
+    def whitened(self, tau: Array, table: Array) -> tuple[Array, Array]:
+        """Whitened means (..., r, c) of a table (p, 6, c), for measured channels.
+
+        At instabilities (..., 7); with ln |R| (...) beyond that of white noise.
+        """
+        known = self.info > 0
+        if self.free_rotations.any():
+            root, log_det = self.whitening(tau)
+            whole: Array = (root @ table)[..., known, :]
+            return whole, log_det
+        excess = self.info * self._shared_variance(tau)
+        weight = np.sqrt(self.info / (1 + excess))[..., known]
+        return weight[..., None] * table[known], np.log1p(excess).sum(axis=(-2, -1))
 
     def whitening(self, tau: Array) -> tuple[Array, Array]:
         """Whitening W of the means at instabilities, (..., p, 6, 6), and ln |R|.
@@ -123,27 +130,41 @@ class Gram:
         return np.linalg.inv(lower) * scale[:, None, :], log_det
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class WeightedGram:
     """A Gram matrix at some instabilities.
 
     Attributes
     ----------
     gram : the matrix without instability
-    white : (r, k) whitened means of the columns, for measured channels
-    residual : (r,) whitened means of y - h
-    weight : (p, 6) information on each mean given the rest of its window
+    weight : (p, 6) information on each mean; empty if they are correlated
     root : (p, 6, 6) whitening of the means; empty if they are uncorrelated
     log_det : ln |R| beyond that of white noise
 
     """
 
     gram: Gram
-    white: Array
-    residual: Array
     weight: Array
     root: Array
     log_det: float
+
+    @cached_property
+    def white(self) -> Array:
+        """Whitened means of the columns, for measured channels, (r, k)."""
+        known = self.gram.info > 0
+        if self.root.size:
+            whole: Array = (self.root @ self.gram.means)[known]
+            return whole
+        return self.gram.means[known] * np.sqrt(self.weight[known])[:, None]
+
+    @cached_property
+    def residual(self) -> Array:
+        """Whitened means of y - h, (r,)."""
+        known = self.gram.info > 0
+        if self.root.size:
+            whole: Array = (self.root @ self.gram.residual[:, :, None])[known, 0]
+            return whole
+        return self.gram.residual[known] * np.sqrt(self.weight[known])
 
     def matrix(self, one: Index, other: Index | None) -> Array:
         """Phi^T R^-1 Phi between columns `one` and `other`; None stands for all."""
@@ -185,7 +206,7 @@ class WeightedGram:
         if kind < 6:
             size += gram.closure_errors[:, :, kind]
         rows, slots = np.nonzero((size > 0) & (gram.info > 0))
-        out = np.zeros((len(self.weight), 6, len(rows)))
+        out = np.zeros((*gram.info.shape, len(rows)))
         at, by = np.arange(len(rows)), size[rows, slots]
         if self.root.size:
             out[rows, :, at] = self.root[rows, :, slots] * by[:, None]

@@ -86,9 +86,7 @@ def test_rows_about_the_same_state_are_linearised_once(
         )
 
 
-def assert_same_columns(
-    one: TurnColumns, other: TurnColumns, used: Mask
-) -> None:
+def assert_same_columns(one: TurnColumns, other: TurnColumns, used: Mask) -> None:
     np.testing.assert_array_equal(one.index, other.index)
     np.testing.assert_allclose(one.closing, other.closing, rtol=1e-12, atol=1e-300)
     for (columns, outputs), (own, alone) in zip(

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
+from fieldcal.model.evidence.block_sum import BlockSum
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +29,7 @@ class Gram:
     Attributes
     ----------
     within : (k, k) Phi^T R^-1 Phi of the courses of windows about their means, and of
-        turns
+        turns, channel by channel
     rhs : (k,) right-hand side of the same, Phi^T R^-1 (y - h)
     square : (y - h)^T R^-1 (y - h) of the same
     means : (p, 6, k) columns' means in each window
@@ -44,7 +45,7 @@ class Gram:
 
     """
 
-    within: Array
+    within: BlockSum
     rhs: Array
     square: float
     means: Array
@@ -63,14 +64,13 @@ class Gram:
         index = np.full(len(self.index), -1, dtype=np.intp)
         index[kept] = np.arange(len(kept))
         return replace(
-            self, within=self.within[np.ix_(at, at)], rhs=self.rhs[at],
+            self, within=self.within.select(at), rhs=self.rhs[at],
             means=self.means[:, :, at], index=index,
         )  # fmt: skip
 
     def blocks(self, columns: Sequence[Index]) -> list[Array]:
         """Blocks of `within`, which do not depend on the instability."""
-        local = [self.index[at] for at in columns]
-        return [self.within[at[:, :, None], at[:, None, :]] for at in local]
+        return [self.within.diagonal_parts(self.index[at]) for at in columns]
 
     def select_windows(self, windows: Mask, info: Array) -> Gram:
         """Some windows, with other information on their means."""
@@ -172,10 +172,10 @@ class WeightedGram:
         white = self.white[:, rows]
         if other is None:
             out: Array = white.T @ self.white
-            out += self.gram.within[rows]
+            out += self.gram.within.rows(rows)
             return out
-        columns = self.gram.index[other]
-        out = self.gram.within[np.ix_(rows, columns)]
+        columns = rows if one is other else self.gram.index[other]
+        out = self.gram.within.part(rows, columns)
         # numpy calculates only half of the product of a matrix with itself
         out += white.T @ (white if one is other else self.white[:, columns])
         return out
@@ -185,10 +185,15 @@ class WeightedGram:
         at = slice(None) if columns is None else self.gram.index[columns]
         return self.gram.rhs[at] + self.white[:, at].T @ self.residual
 
-    def diagonals(self, blocks: Sequence[Index]) -> list[Array]:
-        """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each."""
+    def diagonals(
+        self, blocks: Sequence[Index], within: Sequence[Array]
+    ) -> list[Array]:
+        """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each.
+
+        `within` is `Gram.blocks` of these.
+        """
         out: list[Array] = []
-        for at, inner in zip(blocks, self.gram.blocks(blocks), strict=True):
+        for at, inner in zip(blocks, within, strict=True):
             white = self.white[:, self.gram.index[at]]
             means = np.moveaxis(white, 0, 1)  # (m, r, k)
             out.append(inner + np.swapaxes(means, 1, 2) @ means)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import blake2b
 
 import numpy as np
@@ -91,14 +92,21 @@ class GroupGains:
         self._wide_gains.update(zip(new, gains, strict=True))
         return np.array([self._wide_gains[key] for key in keys]).reshape(*shape, -1)
 
+    @cached_property
+    def _within(self) -> list[Array]:
+        """What does not depend on the instability, of the blocks of each width."""
+        by_width = self._sets.dictionary.groups_by_width
+        return self._sets.gram.blocks([alike.blocks for alike in by_width])
+
     def _weighted_columns(self, instability: InstabilityIndices) -> WeightedColumns:
         """Products of all columns at one instability; cached."""
         if instability not in self._weighted:
             rows = self._sets.gram_at(instability)
             by_width = self._sets.dictionary.groups_by_width
-            blocks = rows.diagonals([alike.blocks for alike in by_width])
-            columns = WeightedColumns(rows, rows.rhs(None), blocks)
-            self._weighted[instability] = columns
+            columns = [alike.blocks for alike in by_width]
+            blocks = rows.diagonals(columns, self._within)
+            weighted = WeightedColumns(rows, rows.rhs(None), blocks)
+            self._weighted[instability] = weighted
         return self._weighted[instability]
 
 

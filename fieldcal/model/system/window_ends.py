@@ -59,7 +59,7 @@ class WindowEnds:
             if part.channel >= 3:
                 continue
             there, c = part.windows, part.channel
-            means[there[:, None], c, part.columns] = part.window_means(part.design)
+            means[there[:, None], c, part.columns] = part.means
             residuals[there, c] = part.window_means(part.white)
             variances[there, c] += 1 / part.info
             at = np.flatnonzero(np.isin(turning, part.columns))

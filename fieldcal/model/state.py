@@ -98,9 +98,12 @@ class State:
         `since` (o, n) is the time since the turn, by origin.
         """
         out: Array = self.bias + self.scale * np.hstack([x.f, x.w])
+        by_origin: dict[int, Experience] = {}
         for term in self.terms:
             if isinstance(term.effect, Sensor):
-                since_origin = replace(x, since_turn=since[term.origin])
+                if term.origin not in by_origin:
+                    by_origin[term.origin] = replace(x, since_turn=since[term.origin])
+                since_origin = by_origin[term.origin]
                 change = term.effect.change_of_outputs(
                     since_origin, term.values, term.shape or NO_SHAPE
                 )

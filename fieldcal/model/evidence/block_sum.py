@@ -49,11 +49,12 @@ class BlockSum:
         array([[ 2.,  0., 13.],
                [ 0.,  0.,  0.]])
         """
+        if len(self.blocks) == 1 and len(self.blocks[0][0]) == self.size:
+            (_, values), place = self.blocks[0], self.places[0]
+            whole: Array = values[place[rows][:, None], place[columns]]
+            return whole
         out = np.zeros((len(rows), len(columns)))
-        for (at, values), place in zip(self.blocks, self.places, strict=True):
-            if len(at) == self.size:
-                out += values[np.ix_(place[rows], place[columns])]
-                continue
+        for (_, values), place in zip(self.blocks, self.places, strict=True):
             here = place[rows]
             there = here if rows is columns else place[columns]
             i = np.flatnonzero(here >= 0)

@@ -97,12 +97,18 @@ class Eliminated:
 
         `kind` is its index 0 to 6; the offsets are in outputs.
         """
-        white = self.rows.shared(kind)
-        ours = self.rows.white[:, self.rows.gram.index[self.columns]]
-        shared = ours.T @ white
-        taken = self.half @ shared
-        inner = white.T @ white - taken.T @ taken
-        return inner, white.T @ self.rows.residual - shared.T @ self.estimate
+        *at, size = self.rows.offsets(kind)
+        where = tuple(at)
+        shared = self._mean_products[where] * size[:, None]
+        taken = shared @ self.half.T
+        inner = -(taken @ taken.T)
+        inner.flat[:: len(size) + 1] += self.rows.mean_information[where] * size**2
+        return inner, self.rows.mean_rhs[where] * size - shared @ self.estimate
+
+    @cached_property
+    def _mean_products(self) -> Array:
+        """R^-1 Phi of the means of windows by the set's columns, (p, 6, a)."""
+        return self.rows.mean_products(self.columns)
 
     def gain_by_size(self, columns: Index, typical: Array) -> Array:
         """Gain of ln Z by a further group, at each of its sizes, (2)."""

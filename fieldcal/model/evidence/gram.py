@@ -204,17 +204,39 @@ class WeightedGram:
         """(y - h)^T R^-1 (y - h)."""
         return self.gram.square + float(self.residual @ self.residual)
 
-    def shared(self, kind: int) -> Array:
-        """Whitened columns of the offsets of single means of a kind, (r, m)."""
+    def offsets(self, kind: int) -> tuple[Index, Index, Array]:
+        """Means that an instability of a kind moves, and by how much for one of 1.
+
+        (m,) windows or turns, channels, and sizes. Rotations correlate only means of
+        different kinds.
+        """
         gram = self.gram
         size = (gram.kind == kind).astype(float)
         if kind < 6:
             size += gram.closure_errors[:, :, kind]
         rows, slots = np.nonzero((size > 0) & (gram.info > 0))
-        out = np.zeros((*gram.info.shape, len(rows)))
-        at, by = np.arange(len(rows)), size[rows, slots]
+        return rows, slots, size[rows, slots]
+
+    @cached_property
+    def mean_information(self) -> Array:
+        """Diagonal of R^-1 of the means, (p, 6)."""
         if self.root.size:
-            out[rows, :, at] = self.root[rows, :, slots] * by[:, None]
-        else:
-            out[rows, slots, at] = np.sqrt(self.weight[rows, slots]) * by
-        return out[gram.info > 0]
+            out: Array = (self.root**2).sum(axis=1)
+            return out
+        return self.weight
+
+    @cached_property
+    def mean_rhs(self) -> Array:
+        """R^-1 (y - h) of the means, (p, 6)."""
+        return self._of_means(self.gram.residual[..., None])[..., 0]
+
+    def mean_products(self, columns: Index) -> Array:
+        """R^-1 Phi of the means by some columns, (p, 6, k)."""
+        return self._of_means(self.gram.means[:, :, self.gram.index[columns]])
+
+    def _of_means(self, table: Array) -> Array:
+        """R^-1 times a table of the means, (p, 6, k)."""
+        if self.root.size:
+            out: Array = np.swapaxes(self.root, 1, 2) @ (self.root @ table)
+            return out
+        return self.weight[..., None] * table

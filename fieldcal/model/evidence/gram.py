@@ -166,18 +166,27 @@ class WeightedGram:
             return whole
         return self.gram.residual[known] * np.sqrt(self.weight[known])
 
-    def matrix(self, one: Index, other: Index | None) -> Array:
-        """Phi^T R^-1 Phi between columns `one` and `other`; None stands for all."""
+    def among(self, gram: Gram) -> WeightedGram:
+        """The same weights for other columns of the same rows."""
+        return replace(self, gram=gram)
+
+    def matrix(self, one: Index, other: Index) -> Array:
+        """Phi^T R^-1 Phi between columns `one` and `other`."""
         rows = self.gram.index[one]
-        white = self.white[:, rows]
-        if other is None:
-            out: Array = white.T @ self.white
-            out += self.gram.within.rows(rows)
-            return out
         columns = rows if one is other else self.gram.index[other]
+        white = self.white[:, rows]
         out = self.gram.within.part(rows, columns)
         # numpy calculates only half of the product of a matrix with itself
         out += white.T @ (white if one is other else self.white[:, columns])
+        return out
+
+    def rows_of(self, columns: Index, within: Array) -> Array:
+        """Phi^T R^-1 Phi between some columns (c,) and all, (c, k).
+
+        `within` (c, k) is what does not depend on the instability.
+        """
+        out: Array = self.white[:, self.gram.index[columns]].T @ self.white
+        out += within
         return out
 
     def rhs(self, columns: Index | None) -> Array:

@@ -55,11 +55,16 @@ class GroupGains:
     def by_width(
         self, levels: Sequence[SetAtInstability]
     ) -> Iterator[tuple[EqualWidthGroups, Array]]:
-        """Gain at each size of every group, (levels, groups, sizes), width by width."""
+        """Gain at each size of every group, (levels, groups, sizes), width by width.
+
+        The levels are those of one set.
+        """
         weighted = [self._weighted_columns(level.instability) for level in levels]
+        gram, of_set = self._sets.gram, levels[0].state.columns
+        within = gram.within.rows(gram.index[of_set])
         halves, rests = [], []
         for columns, level in zip(weighted, levels, strict=True):
-            shared = columns.rows.matrix(level.state.columns, None)
+            shared = columns.rows.rows_of(of_set, within)
             halves.append(level.state.half @ shared)
             rests.append(columns.rhs - shared.T @ level.state.estimate)
         half, rest = np.stack(halves), np.stack(rests)

@@ -230,7 +230,7 @@ def chance_near_zero(sigma: Array, spread: float | Array) -> float:
 
 def _settled_means(cells: Sequence[WindowCells]) -> tuple[Array, Array]:
     """Values c of (3) that the gyroscopes settle to, and their errors, (w, 3) each."""
-    return _fit_constants(cells, LAGS, lambda t, lag: np.exp(-t / lag))
+    return _fit_constants(cells, LAGS, lambda t, lags: np.exp(-t / lags))
 
 
 def _zeroed_means(
@@ -241,19 +241,19 @@ def _zeroed_means(
     times = LAGS[(first < LAGS) & (last > LAGS)]
     if not len(times):
         return
-    means, own = _fit_constants(cells, times, lambda t, end: 1.0 * (t < end))
+    means, own = _fit_constants(cells, times, lambda t, ends: 1.0 * (t < ends))
     of_second = np.array([one.noise_of_a_second for one in cells])
     yield means, own, [np.hypot(own, of_second / np.sqrt(s)) for s in LAGS]
 
 
 def _fit_constants(
-    cells: Sequence[WindowCells], times: Array, shape: Callable[[Array, float], Array]
+    cells: Sequence[WindowCells], times: Array, shape: Callable[[Array, Array], Array]
 ) -> tuple[Array, Array]:
     """Fit constants with a shape; returns those for the best time, and errors."""
-    every = [[one.fit_constant(shape(one.t, time)) for one in cells] for time in times]
-    left = [np.nansum([chi2 for _, _, chi2 in found]) for found in every]
-    best = every[int(np.argmin(left))]
-    return np.array([c for c, _, _ in best]), np.array([s for _, s, _ in best])
+    found = [one.fit_constants(shape(one.t, times[:, None])) for one in cells]
+    means, errors, chi2 = (np.stack(part, axis=1) for part in zip(*found, strict=True))
+    best = int(np.argmin(np.nansum(chi2, axis=(1, 2))))
+    return means[best], errors[best]
 
 
 @dataclass(frozen=True, slots=True)

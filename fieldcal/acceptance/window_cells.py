@@ -56,15 +56,19 @@ class WindowCells:
         second: Array = self.noise * np.sqrt(self.t[1] - self.t[0])
         return second
 
-    def fit_constant(self, shape: Array) -> tuple[Array, Array, Array]:
-        """Fit c and a shape: c, its error, and chi2 of the rest (0 without noise)."""
-        design = np.column_stack([np.ones(len(self.t)), shape])
-        inner = np.linalg.inv(design.T @ design)
-        fit = inner @ (design.T @ self.gyr)
-        left = ((self.gyr - design @ fit) ** 2).sum(axis=0)
+    def fit_constants(self, shapes: Array) -> tuple[Array, Array, Array]:
+        """Fit c and each of some shapes (s, k).
+
+        c, its error, and chi2 of the rest, (s, a) each; chi2 is 0 without noise.
+        """
+        middle = self.gyr.mean(axis=0)
+        off, total = self.gyr - middle, shapes.sum(axis=1)[:, None]
+        square = (shapes**2).sum(axis=1)[:, None]
+        by_shape, det = shapes @ off, len(self.t) * square - total**2
+        left = (off**2).sum(axis=0) - len(self.t) * by_shape**2 / det
         some = self.noise > 0
-        chi2 = np.divide(left, self.noise**2, out=np.zeros(len(some)), where=some)
-        return fit[0], self.noise * np.sqrt(inner[0, 0]), chi2
+        chi2 = np.divide(left, self.noise**2, out=np.zeros(left.shape), where=some)
+        return middle - total * by_shape / det, self.noise * np.sqrt(square / det), chi2
 
 
 def white_noise(gyr: Array) -> Array:

@@ -14,7 +14,12 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known_rows import KnownRows
-from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
+from fieldcal.model.evidence.eliminated import (
+    Eliminated,
+    evidence_gains,
+    gains_from_eigenvalues,
+    largest_gains,
+)
 from fieldcal.model.priors import SIZES
 from fieldcal.model.system.linear_system import gram
 
@@ -235,3 +240,18 @@ def test_of_what_is_known_before_only_wanted_columns_count() -> None:
     )
     np.testing.assert_allclose(found.rhs, [0.0, 4.0])
     assert found.square == pytest.approx(8.0)
+
+
+@SEEDS
+def test_no_size_gains_more_than_each_direction_at_a_size_of_its_own(seed: int) -> None:
+    """One direction gains as much at the best size; several do at the same best one."""
+    rng = np.random.default_rng(seed)
+    strength = np.exp(rng.normal(0.0, 3.0, (50, 3)))
+    power = strength * np.exp(rng.normal(1.0, 1.0, (50, 3)))
+    strength[:5, 0] = power[:5, 0] = 0.0  # a direction that the rows do not determine
+    fine = np.exp(np.linspace(-15.0, 15.0, 4001))
+    for s, p in ((strength, power), (strength[:, :1], power[:, :1])):
+        bound = largest_gains(s, p)
+        best = gains_from_eigenvalues(s, p, fine).max(axis=1)
+        assert (best <= bound + 1e-9).all()
+    np.testing.assert_allclose(best[5:], bound[5:], rtol=1e-4, atol=1e-5)

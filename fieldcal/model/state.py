@@ -77,13 +77,19 @@ class State:
 
     def turned(self, x: Experience) -> Experience:
         """Inputs of rows with small rotations and the Earth's rate alone."""
+        return self.with_earth(self.rotated(x))
+
+    def rotated(self, x: Experience) -> Experience:
+        """Inputs of rows with small rotations alone."""
         if self.small_rotation.any():
             x = rotate_positions(x, self.small_rotation)
         if self.attitude.any():
             x = tilt_positions(x, self.attitude)
-        if self.earth.any():
-            x = x.turned(base_rate=x.base_rate + self.earth)
         return x
+
+    def with_earth(self, x: Experience) -> Experience:
+        """Inputs of rows `x` from `rotated` with the Earth's rate."""
+        return x.turned(base_rate=x.base_rate + self.earth) if self.earth.any() else x
 
     def moved(self, x: Experience) -> Experience:
         """Inputs of rows `x` from `turned` with motion effects."""

@@ -8,7 +8,7 @@ once, except those that need a whole turn, or that change its ends.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.cause import Basis
 from fieldcal.model.state import State
-from fieldcal.model.system.end_columns import EndColumns
+from fieldcal.model.system.end_columns import EndColumns, positions_about
 from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.experience_rows import concatenate_rows
@@ -103,6 +103,7 @@ class ColumnsOfTurns:
     turns: Sequence[Turn]
     views: Sequence[RowView]
     way: bool
+    _held: RowView | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         pairs = zip(self.turns, self.views, strict=True)
@@ -127,7 +128,7 @@ class ColumnsOfTurns:
             if isinstance(basis, Course):
                 self._add_course(first, basis, loose)
             elif basis.sides is not None:
-                self._add_at_ends(EndColumns.of(first, basis, windows, self.state))
+                self._add_at_ends(EndColumns.of(first, basis, self._places(windows)))
             else:
                 table = _outputs(basis, self.views, self._every)
                 columns = first + np.arange(table.shape[2])
@@ -146,6 +147,12 @@ class ColumnsOfTurns:
         """First edge of each turn but the first, among all."""
         out: Index = np.cumsum([len(view.x) for view in self.views])[:-1]
         return out
+
+    def _places(self, windows: Experience) -> RowView:
+        """The positions of the windows' rows; calculated once."""
+        if self._held is None:
+            self._held = positions_about(windows, self.state)
+        return self._held
 
     def _add_at_ends(self, at_ends: EndColumns) -> None:
         """Add a basis that changes the inputs in positions."""

@@ -21,8 +21,9 @@ def derivative(t: Array, values: Array) -> Array:
     >>> derivative(np.array([0.0, 1.0, 3.0]), np.array([0.0, 2.0, 6.0])).tolist()
     [2.0, 2.0, 2.0]
     """
-    at = np.arange(len(t))
-    before, after = np.maximum(at - 1, 0), np.minimum(at + 1, len(t) - 1)
-    gap = (t[after] - t[before]).reshape(-1, *[1] * (values.ndim - 1))
-    slope: Array = (values[after] - values[before]) / gap
+    gap, slope = np.empty(len(t)), np.empty(values.shape)
+    for change, course in ((gap, t), (slope, values)):
+        np.subtract(course[2:], course[:-2], out=change[1:-1])
+        change[0], change[-1] = course[1] - course[0], course[-1] - course[-2]
+    slope /= gap.reshape(-1, *[1] * (values.ndim - 1))
     return slope

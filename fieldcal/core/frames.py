@@ -20,7 +20,7 @@ and -g cos(alpha) sin(beta) in the third line of (5); here the signs follow from
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,7 +59,7 @@ def direction_cosines(
     array([0., 0., 1.])
     """
     alpha, beta = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(beta, float))
-    columns = [in_procedure_axes(alpha, beta, axis, gamma) for axis in np.eye(3)]
+    columns = each_in_procedure_axes(alpha, beta, np.eye(3), gamma)
     return np.stack(columns, axis=-1)
 
 
@@ -110,15 +110,28 @@ def in_procedure_axes(
     >>> np.round(in_procedure_axes(np.zeros(1), quarter, [0, -1, 0]), 12) + 0.0
     array([[0., 0., 1.]])
     """
-    x, y, z = vector
+    return each_in_procedure_axes(alpha, beta, [vector], gamma)[0]
+
+
+def each_in_procedure_axes(
+    alpha: Array,
+    beta: Array,
+    vectors: Iterable[ArrayLike],
+    gamma: ArrayLike | None = None,
+) -> list[Array]:
+    """Several vectors (3,) as by `in_procedure_axes`, each (..., 3)."""
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
-    out, on = np.empty((*ca.shape, 3)), y * ca - x * sa
-    out[..., 0] = x * ca + y * sa  # (3)
-    out[..., 1] = on * cb + z * sb
-    out[..., 2] = z * cb - on * sb
-    return (
-        out if gamma is None else in_axes_turned_about_y(out, np.asarray(gamma, float))
-    )
+    found = []
+    for x, y, z in np.asarray([*vectors], float):
+        out, on = np.empty((*ca.shape, 3)), y * ca - x * sa
+        out[..., 0] = x * ca + y * sa  # (3)
+        out[..., 1] = on * cb + z * sb
+        out[..., 2] = z * cb - on * sb
+        found.append(out)
+    if gamma is None:
+        return found
+    third = np.asarray(gamma, float)
+    return [in_axes_turned_about_y(vector, third) for vector in found]
 
 
 def in_axes_turned_about_y(vector: Array, gamma: Array) -> Array:

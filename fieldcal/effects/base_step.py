@@ -59,7 +59,7 @@ class BaseStep(AttitudeStep):
         if len(rows):
             out[rows] = np.where(
                 known[rows, None, None],
-                x.to_device[rows][:, :, [0, 2]],
+                x.to_device_in(rows)[:, :, [0, 2]],
                 _axes_across(x.f[rows]),
             )
         return out

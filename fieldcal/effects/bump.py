@@ -137,7 +137,12 @@ def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list
     noise = _noise(recording, steps)
     z = recording.six(first, last)
     z /= noise
-    _flatten(z, rate, _most_disturbed_stretch(z, rate, shortest))
+    flat = z.copy()
+    _flatten(flat, rate)
+    if (furthest := _most_disturbed_stretch(flat, rate, shortest)) != NOTHING:
+        _flatten(z, rate, furthest)
+    else:
+        z = flat
     np.nan_to_num(z, copy=False)
     # what goes to the next step and back is rounded, not touched
     for c in np.flatnonzero(0.5 * steps >= noise):
@@ -164,15 +169,14 @@ def _noise(recording: CheckedSamples, steps: Array) -> Array:
 def _most_disturbed_stretch(z: Array, rate: float, m: int) -> slice:
     """Stretch of a second, or a quarter of a window, with the largest deviation.
 
-    `z` is (n, c) in standard deviations. A push as long as that bends the course that
-    is taken out with it, and is no part of what is usual. None where even the furthest
-    is no further than noise goes.
+    `z` is (n, c) in standard deviations, less its slow change. A push as long as that
+    bends the course that is taken out with it, and is no part of what is usual. None
+    where even the furthest is no further than noise goes.
     """
     width = max(min(4 * m, len(z) // 4), 1)
     mean = np.zeros(len(z) - width + 1)
     for column in z.T:
-        off = np.nan_to_num(_deviation_from_course(column, rate))
-        np.maximum(mean, running_means(off, width), out=mean)
+        np.maximum(mean, running_means(np.nan_to_num(column), width), out=mean)
     at, long = int(np.argmax(mean)), min(round(USUAL_PUSH_S * rate), len(z) // 4)
     first = at - (long - width) // 2
     # at the ends nothing on the other side tells the course

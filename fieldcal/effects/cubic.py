@@ -35,5 +35,6 @@ class Cubic(Sensor):
         """Cube of the force along the output's own axis."""
         out = np.zeros((len(x), 6, 3))
         for i in range(3):
-            out[:, i, i] = x.f[:, i] ** 3
+            f = x.f[:, i]
+            out[:, i, i] = f * f * f  # numpy's power takes thirty times as long
         return out

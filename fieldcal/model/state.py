@@ -77,13 +77,19 @@ class State:
 
     def turned(self, x: Experience) -> Experience:
         """Inputs of rows with small rotations and the Earth's rate alone."""
+        return self.with_earth(self.rotated(x))
+
+    def rotated(self, x: Experience) -> Experience:
+        """Inputs of rows with small rotations alone."""
         if self.small_rotation.any():
             x = rotate_positions(x, self.small_rotation)
         if self.attitude.any():
             x = tilt_positions(x, self.attitude)
-        if self.earth.any():
-            x = x.turned(base_rate=x.base_rate + self.earth)
         return x
+
+    def with_earth(self, x: Experience) -> Experience:
+        """Inputs of rows `x` from `rotated` with the Earth's rate."""
+        return x.turned(base_rate=x.base_rate + self.earth) if self.earth.any() else x
 
     def moved(self, x: Experience) -> Experience:
         """Inputs of rows `x` from `turned` with motion effects."""
@@ -98,9 +104,12 @@ class State:
         `since` (o, n) is the time since the turn, by origin.
         """
         out: Array = self.bias + self.scale * np.hstack([x.f, x.w])
+        by_origin: dict[int, Experience] = {}
         for term in self.terms:
             if isinstance(term.effect, Sensor):
-                since_origin = replace(x, since_turn=since[term.origin])
+                if term.origin not in by_origin:
+                    by_origin[term.origin] = replace(x, since_turn=since[term.origin])
+                since_origin = by_origin[term.origin]
                 change = term.effect.change_of_outputs(
                     since_origin, term.values, term.shape or NO_SHAPE
                 )

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.rotation import rotation_matrices
+from fieldcal.core.rotation import cross_matrix, rotation_matrices
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import NO_SHAPE, Separable
 from fieldcal.physics.experience import Experience
@@ -57,7 +57,7 @@ class AttitudeStep(Separable):
     def pattern(self, x: Experience) -> Array:
         """Change of the outputs for a degree about each axis, (n, 6, k)."""
         axes, felt = self.axes(x), (x.f, self.rate(x))
-        turned = [-np.cross(axes, v[:, :, None], axis=1) for v in felt]
+        turned = [cross_matrix(v) @ axes for v in felt]
         out: Array = np.deg2rad(1.0) * np.concatenate(turned, axis=1)
         return out
 

@@ -20,10 +20,10 @@ import numpy as np
 from fieldcal.core.frames import (
     axis_projections,
     direction_cosines,
-    in_procedure_axes,
+    each_in_procedure_axes,
     specific_force_at_home,
 )
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.physics.joint_turns import JointTurns
 
 STEADY = 1e-3
@@ -211,10 +211,13 @@ class Experience:
     @property
     def to_device(self) -> Array:
         """Direction cosines from base to device axes, (n, 3, 3); nan where unknown."""
-        third = self.gamma if self.gamma.any() else None
-        return np.asarray(
-            self.mounting.T @ direction_cosines(self.alpha, self.beta, third), float
-        )
+        return self.to_device_in(slice(None))
+
+    def to_device_in(self, rows: Index | slice) -> Array:
+        """The same in some rows."""
+        third = self.gamma[rows] if self.gamma.any() else None
+        turned = direction_cosines(self.alpha[rows], self.beta[rows], third)
+        return np.asarray(self.mounting.T @ turned, float)
 
     def set_off(self, **angles: Array) -> Self:
         """The rows at other angles than stated, by errors of setting them.
@@ -252,13 +255,12 @@ class Experience:
             return replace(self, **changes)
         gamma = changes.get("gamma", self.gamma)
         third = gamma if gamma.any() else None
-        force = in_procedure_axes(alpha, beta, base_force, third) @ self.mounting
-        earth = in_procedure_axes(alpha, beta, base_rate, third) @ self.mounting
+        both = each_in_procedure_axes(alpha, beta, (base_force, base_rate), third)
+        force, earth = (vector @ self.mounting for vector in both)
         if self.rate.any():
             table = self.rate @ self.mounting
             earth = table + (axis_projections(table) @ earth[:, :, None])[:, :, 0]
-        made = {
-            "f": np.where(known, force, changes.get("f", self.f)),
-            "w": np.where(known, earth, self.w),
-        }
-        return replace(self, **(changes | made))
+        if not known.all():
+            force = np.where(known, force, changes.get("f", self.f))
+            earth = np.where(known, earth, self.w)
+        return replace(self, **(changes | {"f": force, "w": earth}))

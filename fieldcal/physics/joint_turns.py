@@ -66,12 +66,13 @@ class JointTurns:
         Of the last turn that had ended at `t` (n,) s, or ends within `lead` s; of the
         first one before that. `mounting` is P, procedure = P device.
         """
-        alpha, beta, gamma = self.angles[self._last(t, lead)].T
+        alpha, beta, gamma = self.angles.T
         about_alpha = in_procedure_axes(alpha, beta, np.array([0.0, 0.0, 1.0]), gamma)
         about_beta = in_axes_turned_about_y(
-            np.tile([1.0, 0.0, 0.0], (len(t), 1)), gamma
+            np.tile([1.0, 0.0, 0.0], (len(gamma), 1)), gamma
         )
-        return np.stack([about_alpha @ mounting, about_beta @ mounting], axis=2)
+        each = np.stack([about_alpha @ mounting, about_beta @ mounting], axis=2)
+        return each[self._last(t, lead)]
 
     def _last(self, t: Array, lead: float) -> Index:
         last: Index = np.searchsorted(self.at, t + lead, side="right") - 1

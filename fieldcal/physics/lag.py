@@ -8,7 +8,7 @@ to first order in their time constants.
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,5 +33,5 @@ class Lag:
 
     def __add__(self, other: Lag) -> Lag:
         """Sum of both."""
-        both = zip(astuple(self), astuple(other), strict=True)
-        return Lag(*(one + more for one, more in both))
+        names = self.__slots__
+        return Lag(*(getattr(self, name) + getattr(other, name) for name in names))

@@ -207,12 +207,14 @@ def step_between(shown: Array) -> float:
 
 def _grid(gaps: Array, step: float) -> float:
     """Step of which all gaps are multiples, about a first guess; 0 if there is none."""
+    total, widest = float(gaps.sum()), float(gaps.max())
     for _ in range(3):  # the grid's own step is the mean over many, not one difference
         steps = gaps / step
         whole = np.round(steps)
-        if np.abs(steps - whole).max() > 0.1 + 0.02 * whole.max() ** 0.5:
+        most = 0.1 + 0.02 * round(widest / step) ** 0.5
+        if most < 0.5 and np.abs(steps - whole).max() > most:
             return 0.0
-        step = float(gaps.sum() / whole.sum())
+        step = total / float(whole.sum())
     off = np.abs(gaps / step - np.round(gaps / step))
     return step if off.max() < 0.05 else 0.0
 

@@ -22,6 +22,7 @@ from itertools import product
 import numpy as np
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.once import once_per_block
 from fieldcal.core.rotation import nearest_rotation
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Block
 from fieldcal.windows.alternation import (
@@ -105,18 +106,23 @@ def find_mixed_devices(
         first, last = np.searchsorted(block.t, (begin, end))
         if last - first < FEWEST_SAMPLES:
             continue
-        six = block[first:last].six
-        ends = [alternating_means(part) for part in _ends(six)]
+        ends = _means_at_ends(block, int(first), int(last))
         known = [means for means in ends if means is not None]
         if len(known) == len(ends) and _are_the_same(known):
             apart.append(known[0])
         elif len(known) < len(ends) and all(map(_is_barely_seen, known)):
-            alike.append(six[:, ACC].mean(axis=0))
+            alike.append(block.acc[first:last].mean(axis=0))
         else:
             return None
     everywhere = len(apart) >= FEWEST_WINDOWS and not alike
     same = everywhere and (_are_the_same(apart) or _have_same_rates(apart))
     return apart[0] if same or _are_turned(apart, alike) else None
+
+
+@once_per_block
+def _means_at_ends(block: Block, first: int, last: int) -> list[TwoMeans | None]:
+    """Means of two devices in the parts of a window, None of what is of one."""
+    return [alternating_means(part) for part in _ends(block[first:last].six)]
 
 
 def refuse_mixed_devices(

@@ -6,7 +6,7 @@ import weakref
 import numpy as np
 
 from fieldcal.core.once import once_per_block
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import Array, Block, Index
 
 
 def block() -> Block:
@@ -37,3 +37,19 @@ def test_a_block_that_nobody_uses_is_forgotten() -> None:
     del one
     gc.collect()
     assert gone() is None
+
+
+def test_it_is_computed_anew_for_other_values_of_further_arguments() -> None:
+    """Arrays are the same if their values, shape and type are."""
+    asked = []
+
+    @once_per_block
+    def count(one: Block, at: Array | Index, scale: float = 1.0) -> int:
+        asked.append((one, at, scale))
+        return len(asked)
+
+    one, at = block(), np.arange(4.0)
+    assert (count(one, at), count(one, at.copy()), count(one, at, 2.0)) == (1, 1, 2)
+    assert count(one, at.reshape(2, 2)) == 3
+    assert count(one, np.arange(4)) == 4
+    assert (count(one, at, scale=2.0), count(one, at)) == (5, 1)

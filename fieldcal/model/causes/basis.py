@@ -18,7 +18,6 @@ from fieldcal.physics.effect import NO_SHAPE, Sensor
 from fieldcal.physics.experience import Experience
 
 CentralDifference = tuple[Experience, Experience, float]
-Sides = Callable[[Experience, State], Iterator[CentralDifference]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +42,8 @@ class RowView:
     _by_origin: dict[int, Experience] = field(
         default_factory=dict, init=False, repr=False
     )
+    _rotated: list[Experience] = field(default_factory=list, init=False, repr=False)
+    _turned: list[Experience] = field(default_factory=list, init=False, repr=False)
     rotations: list[Array] = field(default_factory=list, init=False, repr=False)
 
     @classmethod
@@ -50,12 +51,30 @@ class RowView:
         """Rows at a base state."""
         return cls(plain, state.experienced(plain), since, state)
 
+    @property
+    def rotated(self) -> Experience:
+        """Inputs with the state's small rotations alone."""
+        if not self._rotated:
+            self._rotated.append(self.state.rotated(self.nominal))
+        return self._rotated[0]
+
+    @property
+    def turned(self) -> Experience:
+        """Inputs with the state's small rotations and the Earth's rate alone."""
+        if not self._turned:
+            self._turned.append(self.state.with_earth(self.rotated))
+        return self._turned[0]
+
     def with_origin(self, origin: int) -> Experience:
         """Inputs whose time since the turn counts from one origin."""
         if origin not in self._by_origin:
             since_origin = replace(self.x, since_turn=self.since[origin])
             self._by_origin[origin] = since_origin
         return self._by_origin[origin]
+
+
+Sides = Callable[[RowView], Iterator[CentralDifference]]
+"""Inputs for each of some parameters, a step up and a step down, and the step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +122,7 @@ def central_differences(sides: Sides) -> Callable[[RowView], Array]:
     def of(view: RowView) -> Array:
         columns = [
             output_derivative(up, down, step, view.state)
-            for up, down, step in sides(view.nominal, view.state)
+            for up, down, step in sides(view)
         ]
         return np.stack(columns, axis=2)
 

@@ -67,9 +67,13 @@ def state_sides(
         yield up, down, float(step.max())
 
 
-def earth_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
+def earth_sides(view: RowView) -> Iterator[CentralDifference]:
     """Inputs for a change of the base's rate about each of its axes, rad/s."""
-    return state_sides(plain, state, "earth", EARTH_RATE * np.eye(3))
+    for step in EARTH_RATE * np.eye(3):
+        rates = (view.state.earth + s * step for s in (1.0, -1.0))
+        ends = (replace(view.state, earth=rate) for rate in rates)
+        up, down = (state.moved(state.with_earth(view.rotated)) for state in ends)
+        yield up, down, float(step.max())
 
 
 earth = central_differences(earth_sides)
@@ -118,7 +122,7 @@ def attitude(view: RowView) -> Array:
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 3 * places))
     held = np.flatnonzero(view.nominal.position >= 0)
-    axes = np.swapaxes(view.x.to_device[held], 1, 2)  # of the base, in device axes
+    axes = np.swapaxes(view.x.to_device_in(held), 1, 2)  # of the base, in device axes
     at = 3 * view.nominal.position[held]
     for i in range(3):
         change = [np.cross(v[held], axes[:, i]) for v in (view.x.f, view.x.w)]
@@ -126,18 +130,18 @@ def attitude(view: RowView) -> Array:
     return out
 
 
-def attitude_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
+def attitude_sides(view: RowView) -> Iterator[CentralDifference]:
     """Inputs for a change of the measured attitudes about each base axis, rad."""
+    state = view.state
     if not state.attitude.any():
         state = replace(state, attitude=np.zeros((len(state.small_rotation), 3)))
-    return state_sides(plain, state, "attitude", ROTATION_STEP_RAD * np.eye(3))
+    return state_sides(view.nominal, state, "attitude", ROTATION_STEP_RAD * np.eye(3))
 
 
-def small_rotation_sides(
-    plain: Experience, state: State
-) -> Iterator[CentralDifference]:
+def small_rotation_sides(view: RowView) -> Iterator[CentralDifference]:
     """Inputs for two small rotations of every position, rad."""
-    return state_sides(plain, state, "small_rotation", ROTATION_STEP_RAD * np.eye(2))
+    steps = ROTATION_STEP_RAD * np.eye(2)
+    return state_sides(view.nominal, view.state, "small_rotation", steps)
 
 
 def small_rotation(view: RowView) -> Array:
@@ -153,8 +157,7 @@ def _small_rotation(view: RowView) -> Array:
     out = np.zeros((len(view.x), 6, 2 * places))
     at = view.nominal.position
     held = np.flatnonzero(at >= 0)
-    sides = small_rotation_sides(view.nominal, view.state)
-    for joint, (up, down, step) in enumerate(sides):
+    for joint, (up, down, step) in enumerate(small_rotation_sides(view)):
         change = output_derivative(up, down, step, view.state)
         out[held, :, 2 * at[held] + joint] = change[held]
     return out

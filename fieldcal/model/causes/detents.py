@@ -9,9 +9,8 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes import columns
-from fieldcal.model.causes.basis import CentralDifference, General
+from fieldcal.model.causes.basis import CentralDifference, General, RowView
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.joint_turns import ANGLE_TOLERANCE_RAD
 
@@ -60,10 +59,10 @@ def detent_columns(table: ColumnTable, shared: Sequence[Detent]) -> Index:
     """Append a column, rad, for the error of each detent; their indices, (m,)."""
     rotations = detent_rotations(shared, table.position_count)
 
-    def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
+    def sides(view: RowView) -> Iterator[CentralDifference]:
         """Inputs for a change of each detent's error, a step up and down."""
         steps = columns.ROTATION_STEP_RAD * rotations.T.reshape(len(shared), -1, 2)
-        return columns.state_sides(plain, state, "small_rotation", steps)
+        return columns.state_sides(view.nominal, view.state, "small_rotation", steps)
 
     basis = General(
         "detents", lambda v: columns.small_rotation(v) @ rotations, sides=sides

@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Index
+from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Index, Mask
 from fieldcal.effects import catalogue
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
 from fieldcal.model.causes.column_table import ColumnTable
@@ -177,9 +177,16 @@ def units_of(table: ColumnTable, effect: Effect) -> Array:
     """
     if not isinstance(effect, Sensor) or effect.of_inputs:
         return np.ones(len(effect.params))
-    reach = np.abs(effect.design(_rows_in_motion(), _any_shape(effect))).max(axis=0)
-    gyro = (reach[GYR].max(axis=0) > 0) & (reach[ACC].max(axis=0) == 0)
+    gyro = _changes_gyroscopes_only(effect)
     out: Array = np.abs(np.where(gyro, table.unit[3], table.unit[0]))
+    return out
+
+
+@cache
+def _changes_gyroscopes_only(effect: Sensor) -> Mask:
+    """Parameters that change outputs of gyroscopes and none of accelerometers, (k,)."""
+    reach = np.abs(effect.design(_rows_in_motion(), _any_shape(effect))).max(axis=0)
+    out: Mask = (reach[GYR].max(axis=0) > 0) & (reach[ACC].max(axis=0) == 0)
     return out
 
 

@@ -68,10 +68,10 @@ def _motion_basis(effect: Motion) -> General:
             step[j] = DERIVATIVE_STEP * param.typical
             yield step
 
-    def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
-        turned = state.turned(plain)
+    def sides(view: RowView) -> Iterator[CentralDifference]:
         for step in steps():
-            up, down = (_changed(turned, state, effect, s) for s in (step, -step))
+            ends = (step, -step)
+            up, down = (_changed(view.turned, view.state, effect, s) for s in ends)
             yield up, down, float(step.max())
 
     def on_the_way(view: RowView) -> Array:

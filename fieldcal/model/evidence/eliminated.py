@@ -97,12 +97,18 @@ class Eliminated:
 
         `kind` is its index 0 to 6; the offsets are in outputs.
         """
-        white = self.rows.shared(kind)
-        ours = self.rows.white[:, self.rows.gram.index[self.columns]]
-        shared = ours.T @ white
-        taken = self.half @ shared
-        inner = white.T @ white - taken.T @ taken
-        return inner, white.T @ self.rows.residual - shared.T @ self.estimate
+        *at, size = self.rows.offsets(kind)
+        where = tuple(at)
+        shared = self._mean_products[where] * size[:, None]
+        taken = shared @ self.half.T
+        inner = -(taken @ taken.T)
+        inner.flat[:: len(size) + 1] += self.rows.mean_information[where] * size**2
+        return inner, self.rows.mean_rhs[where] * size - shared @ self.estimate
+
+    @cached_property
+    def _mean_products(self) -> Array:
+        """R^-1 Phi of the means of windows by the set's columns, (p, 6, a)."""
+        return self.rows.mean_products(self.columns)
 
     def gain_by_size(self, columns: Index, typical: Array) -> Array:
         """Gain of ln Z by a further group, at each of its sizes, (2)."""
@@ -117,6 +123,17 @@ def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
 
     `own` (...) is the largest diagonal element of T G T before the elimination.
     """
+    return gains_from_eigenvalues(*group_directions(inner, rhs, own))
+
+
+def group_directions(
+    inner: Array, rhs: Array, own: Array | float
+) -> tuple[Array, Array]:
+    """Eigenvalues lambda and q^2 of (2) of groups of equal width, (..., k) each.
+
+    The parameters are those of `evidence_gains`. Both are 0 in a direction that the
+    rows do not determine.
+    """
     if rhs.shape[-1] == 1:
         strength, power = inner[..., 0], rhs**2
     else:
@@ -127,7 +144,23 @@ def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
     )
     strength = np.where(determined, strength, 0.0)
     power = np.where(determined, power, 0.0)
-    return gains_from_eigenvalues(strength, power)
+    return strength, power
+
+
+def largest_gains(strength: Array, power: Array) -> Array:
+    """Upper bound of the gain (2) at any size, (...), of lambda and q^2, (..., k).
+
+    That of each direction at a size of its own, v^2 lambda = q^2 / lambda - 1.
+
+    >>> strength, power = np.array([4.0, 3.0]), np.array([36.0, 24.0])
+    >>> gains = gains_from_eigenvalues(strength, power)
+    >>> bool(gains.max() <= largest_gains(strength, power) < gains.max() + 0.1)
+    True
+    """
+    ratio = np.divide(power, strength, out=np.ones(power.shape), where=strength > 0)
+    ratio = np.maximum(ratio, 1.0)
+    most: Array = 0.5 * (ratio - 1 - np.log(ratio)).sum(axis=-1)
+    return most
 
 
 def gains_from_eigenvalues(

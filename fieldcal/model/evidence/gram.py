@@ -14,10 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
+from fieldcal.model.evidence.block_sum import BlockSum
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,7 @@ class Gram:
     Attributes
     ----------
     within : (k, k) Phi^T R^-1 Phi of the courses of windows about their means, and of
-        turns
+        turns, channel by channel
     rhs : (k,) right-hand side of the same, Phi^T R^-1 (y - h)
     square : (y - h)^T R^-1 (y - h) of the same
     means : (p, 6, k) columns' means in each window
@@ -43,7 +45,7 @@ class Gram:
 
     """
 
-    within: Array
+    within: BlockSum
     rhs: Array
     square: float
     means: Array
@@ -62,14 +64,13 @@ class Gram:
         index = np.full(len(self.index), -1, dtype=np.intp)
         index[kept] = np.arange(len(kept))
         return replace(
-            self, within=self.within[np.ix_(at, at)], rhs=self.rhs[at],
+            self, within=self.within.select(at), rhs=self.rhs[at],
             means=self.means[:, :, at], index=index,
         )  # fmt: skip
 
     def blocks(self, columns: Sequence[Index]) -> list[Array]:
         """Blocks of `within`, which do not depend on the instability."""
-        local = [self.index[at] for at in columns]
-        return [self.within[at[:, :, None], at[:, None, :]] for at in local]
+        return [self.within.diagonal_parts(self.index[at]) for at in columns]
 
     def select_windows(self, windows: Mask, info: Array) -> Gram:
         """Some windows, with other information on their means."""
@@ -80,21 +81,13 @@ class Gram:
 
     def with_instability(self, tau: Array) -> WeightedGram:
         """Weight the means with instabilities by kind, (7,)."""
-        known = self.info > 0
         if self.free_rotations.any():
-            full, log_det = self.whitening(tau)
-            own = np.diagonal(np.swapaxes(full, 1, 2) @ full, 0, 1, 2)
-            return WeightedGram(
-                self, (full @ self.means)[known],
-                (full @ self.residual[:, :, None])[known, 0], own, full, float(log_det),
-            )  # fmt: skip
+            root, log_det = self.whitening(tau)
+            return WeightedGram(self, np.zeros(0), root, float(log_det))
         variance = self._shared_variance(tau)
         weight = self.info / (1 + self.info * variance)
         log_det = np.log1p(self.info * variance).sum()
-        root = np.sqrt(weight[known])
-        white: Array = self.means[known] * root[:, None]
-        residual: Array = self.residual[known] * root
-        return WeightedGram(self, white, residual, weight, np.zeros(0), float(log_det))
+        return WeightedGram(self, weight, np.zeros(0), float(log_det))
 
     def _shared_variance(self, tau: Array) -> Array:
         """Variance of the means in addition to white noise, by channel, (..., p, 6).
@@ -105,6 +98,20 @@ class Gram:
         closures = np.einsum("pij,...j->...pi", self.closure_errors**2, square[..., :6])
         out: Array = self.shared**2 + square[..., self.kind] + closures
         return out
+
+    def whitened(self, tau: Array, table: Array) -> tuple[Array, Array]:
+        """Whitened means (..., r, c) of a table (p, 6, c), for measured channels.
+
+        At instabilities (..., 7); with ln |R| (...) beyond that of white noise.
+        """
+        known = self.info > 0
+        if self.free_rotations.any():
+            root, log_det = self.whitening(tau)
+            whole: Array = (root @ table)[..., known, :]
+            return whole, log_det
+        excess = self.info * self._shared_variance(tau)
+        weight = np.sqrt(self.info / (1 + excess))[..., known]
+        return weight[..., None] * table[known], np.log1p(excess).sum(axis=(-2, -1))
 
     def whitening(self, tau: Array) -> tuple[Array, Array]:
         """Whitening W of the means at instabilities, (..., p, 6, 6), and ln |R|.
@@ -123,40 +130,63 @@ class Gram:
         return np.linalg.inv(lower) * scale[:, None, :], log_det
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class WeightedGram:
     """A Gram matrix at some instabilities.
 
     Attributes
     ----------
     gram : the matrix without instability
-    white : (r, k) whitened means of the columns, for measured channels
-    residual : (r,) whitened means of y - h
-    weight : (p, 6) information on each mean given the rest of its window
+    weight : (p, 6) information on each mean; empty if they are correlated
     root : (p, 6, 6) whitening of the means; empty if they are uncorrelated
     log_det : ln |R| beyond that of white noise
 
     """
 
     gram: Gram
-    white: Array
-    residual: Array
     weight: Array
     root: Array
     log_det: float
 
-    def matrix(self, one: Index, other: Index | None) -> Array:
-        """Phi^T R^-1 Phi between columns `one` and `other`; None stands for all."""
+    @cached_property
+    def white(self) -> Array:
+        """Whitened means of the columns, for measured channels, (r, k)."""
+        known = self.gram.info > 0
+        if self.root.size:
+            whole: Array = (self.root @ self.gram.means)[known]
+            return whole
+        return self.gram.means[known] * np.sqrt(self.weight[known])[:, None]
+
+    @cached_property
+    def residual(self) -> Array:
+        """Whitened means of y - h, (r,)."""
+        known = self.gram.info > 0
+        if self.root.size:
+            whole: Array = (self.root @ self.gram.residual[:, :, None])[known, 0]
+            return whole
+        return self.gram.residual[known] * np.sqrt(self.weight[known])
+
+    def among(self, gram: Gram) -> WeightedGram:
+        """The same weights for other columns of the same rows."""
+        return replace(self, gram=gram)
+
+    def matrix(self, one: Index, other: Index) -> Array:
+        """Phi^T R^-1 Phi between columns `one` and `other`."""
         rows = self.gram.index[one]
+        columns = rows if one is other else self.gram.index[other]
         white = self.white[:, rows]
-        if other is None:
-            out: Array = white.T @ self.white
-            out += self.gram.within[rows]
-            return out
-        columns = self.gram.index[other]
-        out = self.gram.within[np.ix_(rows, columns)]
+        out = self.gram.within.part(rows, columns)
         # numpy calculates only half of the product of a matrix with itself
         out += white.T @ (white if one is other else self.white[:, columns])
+        return out
+
+    def rows_of(self, columns: Index, within: Array) -> Array:
+        """Phi^T R^-1 Phi between some columns (c,) and all, (c, k).
+
+        `within` (c, k) is what does not depend on the instability.
+        """
+        out: Array = self.white[:, self.gram.index[columns]].T @ self.white
+        out += within
         return out
 
     def rhs(self, columns: Index | None) -> Array:
@@ -164,10 +194,15 @@ class WeightedGram:
         at = slice(None) if columns is None else self.gram.index[columns]
         return self.gram.rhs[at] + self.white[:, at].T @ self.residual
 
-    def diagonals(self, blocks: Sequence[Index]) -> list[Array]:
-        """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each."""
+    def diagonals(
+        self, blocks: Sequence[Index], within: Sequence[Array]
+    ) -> list[Array]:
+        """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each.
+
+        `within` is `Gram.blocks` of these.
+        """
         out: list[Array] = []
-        for at, inner in zip(blocks, self.gram.blocks(blocks), strict=True):
+        for at, inner in zip(blocks, within, strict=True):
             white = self.white[:, self.gram.index[at]]
             means = np.moveaxis(white, 0, 1)  # (m, r, k)
             out.append(inner + np.swapaxes(means, 1, 2) @ means)
@@ -178,17 +213,39 @@ class WeightedGram:
         """(y - h)^T R^-1 (y - h)."""
         return self.gram.square + float(self.residual @ self.residual)
 
-    def shared(self, kind: int) -> Array:
-        """Whitened columns of the offsets of single means of a kind, (r, m)."""
+    def offsets(self, kind: int) -> tuple[Index, Index, Array]:
+        """Means that an instability of a kind moves, and by how much for one of 1.
+
+        (m,) windows or turns, channels, and sizes. Rotations correlate only means of
+        different kinds.
+        """
         gram = self.gram
         size = (gram.kind == kind).astype(float)
         if kind < 6:
             size += gram.closure_errors[:, :, kind]
         rows, slots = np.nonzero((size > 0) & (gram.info > 0))
-        out = np.zeros((len(self.weight), 6, len(rows)))
-        at, by = np.arange(len(rows)), size[rows, slots]
+        return rows, slots, size[rows, slots]
+
+    @cached_property
+    def mean_information(self) -> Array:
+        """Diagonal of R^-1 of the means, (p, 6)."""
         if self.root.size:
-            out[rows, :, at] = self.root[rows, :, slots] * by[:, None]
-        else:
-            out[rows, slots, at] = np.sqrt(self.weight[rows, slots]) * by
-        return out[gram.info > 0]
+            out: Array = (self.root**2).sum(axis=1)
+            return out
+        return self.weight
+
+    @cached_property
+    def mean_rhs(self) -> Array:
+        """R^-1 (y - h) of the means, (p, 6)."""
+        return self._of_means(self.gram.residual[..., None])[..., 0]
+
+    def mean_products(self, columns: Index) -> Array:
+        """R^-1 Phi of the means by some columns, (p, 6, k)."""
+        return self._of_means(self.gram.means[:, :, self.gram.index[columns]])
+
+    def _of_means(self, table: Array) -> Array:
+        """R^-1 times a table of the means, (p, 6, k)."""
+        if self.root.size:
+            out: Array = np.swapaxes(self.root, 1, 2) @ (self.root @ table)
+            return out
+        return self.weight[..., None] * table

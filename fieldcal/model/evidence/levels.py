@@ -2,21 +2,22 @@
 
 Only the means of windows and the closures of turns depend on the instability; the
 information of all other rows is always the same. With W the whitening of those means at
-one instability, and X their columns of the set, further columns, and as the last column
-their residuals,
+one instability, and X their columns of the set, their residuals as a column beside
+these, and further columns,
 
     T = T_0 + X^T W^T W X                                                           (1)
 
 contains G and b of the set, its products R with the further columns, their own M and c,
 and the squares of the residuals. With S the prior standard deviations of the set, and 1
-for the residuals,
+for all others,
 
-    [L 0; l^T r] [L 0; l^T r]^T = 1 + S T S,    l = L^-1 S b                        (2)
+    [L 0 0; l^T r 0; N^T * *] [L 0 0; l^T r 0; N^T * *]^T = 1 + S T S,
+    l = L^-1 S b,    N = L^-1 S R                                                   (2)
     ln Z = (1 - r^2 - ln |R|) / 2 - ln |L|                                          (3)
 
 is (1) of `eliminated`. After the elimination of the set, the further columns have
 
-    N = L^-1 S R,    M' = M - N^T N,    c' = c - N^T l                              (4)
+    M' = M - N^T N,    c' = c - N^T l                                               (4)
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
-from fieldcal.model.evidence.gram import Gram, WeightedGram
+from fieldcal.model.evidence.gram import Gram
 
 MAX_NUMBERS = 4_000_000
 """Largest number of table elements that are calculated at once: 30 MB."""
@@ -77,29 +78,21 @@ def scan_instabilities(
 
     """
     sizes = np.broadcast_to(sizes, (len(taus), len(columns)))
-    all_columns = np.concatenate([columns, further.ravel()])
     moved = _affected_means(gram, np.flatnonzero(np.ptp(taus, axis=0)))
-    still = replace(gram, info=np.where(moved, 0.0, gram.info)).with_instability(
-        taus[0]
-    )
-    common = _joint_gram(still, all_columns)
+    still = replace(gram, info=np.where(moved, 0.0, gram.info))
+    common, fixed_log_det = _joint_gram(still, taus[0], columns, further.ravel())
     windows: Mask = np.any(moved, axis=1)
     reduced = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
-    table = np.append(
-        reduced.means[:, :, reduced.index[all_columns]],
-        reduced.residual[..., None],
-        axis=2,
-    )
+    table = _joint_table(reduced, columns, further.ravel())
     rows, width = int(moved.sum()), len(common)
     step = max(1, MAX_NUMBERS // (width * (rows + width)))
     parts = []
     for first in range(0, len(taus), step):
         part = slice(first, first + step)
-        root, log_det = reduced.whitening(taus[part])
-        white = (root @ table)[:, moved[windows]]
+        white, log_det = reduced.whitened(taus[part], table)
         total = common + np.swapaxes(white, 1, 2) @ white  # (1)
         eliminated = _eliminate(total, sizes[part], further.shape)
-        score = eliminated.score - 0.5 * (log_det + still.log_det)
+        score = eliminated.score - 0.5 * (log_det + fixed_log_det)
         parts.append(eliminated._replace(score=score))
     return InstabilityScan(*map(np.concatenate, zip(*parts, strict=True)))
 
@@ -114,33 +107,43 @@ def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> Mask:
     return own & (gram.info > 0)
 
 
-def _joint_gram(rows: WeightedGram, columns: Index) -> Array:
-    """T of rows and columns (c,), (c + 1, c + 1)."""
-    out = np.empty((len(columns) + 1, len(columns) + 1))
-    out[:-1, :-1] = rows.matrix(columns, columns)
-    out[-1, :-1] = out[:-1, -1] = rows.rhs(columns)
-    out[-1, -1] = rows.square
-    return out
+def _joint_table(gram: Gram, columns: Index, further: Index) -> Array:
+    """X of the set's columns (a,), the residuals and further ones, (p, 6, c)."""
+    of_set, others = (gram.means[:, :, gram.index[at]] for at in (columns, further))
+    return np.concatenate([of_set, gram.residual[..., None], others], axis=2)
+
+
+def _joint_gram(
+    gram: Gram, tau: Array, columns: Index, further: Index
+) -> tuple[Array, float]:
+    """T (c, c) of rows at one instability (7,), in the order of X, and their ln |R|."""
+    rows, a = gram.with_instability(tau), len(columns)
+    every = np.concatenate([columns, further])
+    at = np.delete(np.arange(len(every) + 1), a)
+    out = np.empty((len(every) + 1, len(every) + 1))
+    out[np.ix_(at, at)] = rows.matrix(every, every)
+    out[a, at] = out[at, a] = rows.rhs(every)
+    out[a, a] = rows.square
+    return out, rows.log_det
 
 
 def _eliminate(total: Array, sizes: Array, shape: tuple[int, ...]) -> InstabilityScan:
-    """(2) to (4) of T, (n, c + 1, c + 1), whose first columns have sizes (n, a)."""
+    """(2) to (4) of T, (n, c, c), whose first columns have sizes (n, a)."""
     n, a = sizes.shape
-    known = [*range(a), -1]
-    wide = np.append(sizes, np.ones((n, 1)), axis=1)
-    scaled = total[:, known][:, :, known] * wide[:, :, None] * wide[:, None, :]
-    scaled[:, range(a + 1), range(a + 1)] += 1.0
-    root_and_rhs = cholesky_root(scaled)
-    root, projected = root_and_rhs[:, :-1, :-1], root_and_rhs[:, -1, :-1]
-    score = 0.5 * (1 - root_and_rhs[:, -1, -1] ** 2)
+    wide = np.ones(total.shape[:2])
+    wide[:, :a] = sizes
+    scaled = total * wide[:, :, None]
+    scaled *= wide[:, None, :]
+    scaled[:, range(len(wide[0])), range(len(wide[0]))] += 1.0
+    whole = cholesky_root(scaled)
+    root, projected = whole[:, :a, :a], whole[:, a, :a]
+    score = 0.5 * (1 - whole[:, a, a] ** 2)
     score -= np.log(np.diagonal(root, 0, 1, 2)).sum(axis=1)
-    at = a + np.arange(int(np.prod(shape))).reshape(shape)
-    own, rhs = total[:, at[:, :, None], at[:, None, :]], total[:, at, -1]
+    at = a + 1 + np.arange(int(np.prod(shape))).reshape(shape)
+    own, rhs = total[:, at[:, :, None], at[:, None, :]], total[:, at, a]
     diagonal = np.diagonal(own, 0, 2, 3)
     if at.size:
-        taken = np.linalg.solve(root, total[:, :a, a:-1] * sizes[..., None])
-        taken = np.moveaxis(taken.reshape(n, a, *shape), 1, 2)  # (n, w, a, k)
-        turned = np.swapaxes(taken, 2, 3)
-        own = own - turned @ taken
+        turned = whole[:, at, :a]  # N^T, (n, w, k, a)
+        own = own - turned @ np.swapaxes(turned, 2, 3)
         rhs = rhs - (turned @ projected[:, None, :, None])[..., 0]
     return InstabilityScan(score, sizes, root, projected, own, rhs, diagonal)

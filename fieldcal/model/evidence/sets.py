@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -156,9 +156,9 @@ class Sets:
             sizing = Sizing(
                 self.dictionary, self.gram, self.typical_instability, members, start
             )
-            sizes, score, wide = sizing.run()
+            sizes, score = sizing.run()
             rows = self.gram_at(sizes.instability)
-            state = Eliminated.of(rows, sizing.columns, wide)
+            state = replace(sizing.eliminated(), rows=rows)  # with all columns
             score += self.set_log_prior(members)
             self.visited[key] = Set(members, sizes, score, state)
         return self.visited[key]

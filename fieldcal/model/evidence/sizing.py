@@ -157,11 +157,8 @@ class Sizing:
         self._states: dict[tuple[int, ...], Eliminated] = {}
         self._channel_gains: dict[tuple[int, ...], Array] = {}
 
-    def run(self) -> tuple[Sizes, float, Array]:
-        """Iterate until no size changes.
-
-        Returns the sizes, ln Z summed over them, and the columns' standard deviations.
-        """
+    def run(self) -> tuple[Sizes, float]:
+        """Iterate until no size changes; the sizes, and ln Z summed over them."""
         free = [i for i, g in enumerate(self.groups) if g.fixed_size is None]
         channels = np.flatnonzero(self.typical_instability > 0).tolist()
         profiles: list[Array] = []
@@ -182,7 +179,7 @@ class Sizing:
         sizes = Sizes(
             tuple(self.sizes[:k]), tuple(self.instability), tuple(self.sizes[k:])
         )
-        return sizes, score, self._prior_sigma()
+        return sizes, score
 
     def eliminated(self) -> Eliminated:
         """The set eliminated at the current sizes; cached."""

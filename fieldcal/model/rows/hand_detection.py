@@ -14,6 +14,8 @@ hand the direction of the force varies beyond their noise, on a table it does no
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import numpy as np
 
 from fieldcal.core.samples import GYR, Array, Mask
@@ -66,9 +68,12 @@ def _relative_tremor(rates: Array, rate: float) -> Array:
     white = noise[measured] ** 2 / rate * (many / rate) / 15
     parts = np.array_split(rates[:, measured], len(rates) // many)
     nothing = np.zeros(len(white))
-    turned = [tremor_rms(part, len(part) / rate, nothing) ** 2 for part in parts]
+    turned = [
+        tremor_rms(np.stack(list(alike)), length / rate, nothing) ** 2
+        for length, alike in groupby(parts, key=len)
+    ]
     # a hand does so all the time, and a bump in a second or two
-    usual = np.median(turned, axis=0)
+    usual = np.median(np.concatenate(turned), axis=0)
     unrest[measured] = usual / np.where(white > 0, white, np.nan)
     return unrest
 
@@ -103,24 +108,25 @@ def noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array 
 
 
 def tremor_rms(values: Array, length: float, white: Array) -> Array:
-    """Rms of the integrated outputs, an angle or a speed, about a line, (k,).
+    """Rms of the integrated outputs, an angle or a speed, about a line, (..., k).
 
     Parameters
     ----------
-    values : (n, k) outputs, nan where missing
+    values : (..., n, k) outputs, nan where missing
     length : T, s
     white : (k,) deviation of the mean by white noise, N / sqrt(T)
 
     """
-    known = np.isfinite(values)
-    mean = np.nan_to_num(values).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    off = np.where(known, values - mean, 0.0)
-    total = np.cumsum(off, axis=0) * (length / len(off))
-    part = np.linspace(-1.0, 1.0, len(off))
-    line = np.linalg.qr(np.column_stack([np.ones_like(part), part]))[0]
-    total -= line @ (line.T @ total)
+    known, n = np.isfinite(values), values.shape[-2]
+    count = np.maximum(known.sum(axis=-2, keepdims=True), 1)
+    mean = np.where(known, values, 0.0).sum(axis=-2, keepdims=True) / count
+    total = np.cumsum(np.where(known, values - mean, 0.0), axis=-2) * (length / n)
+    part = np.linspace(-1.0, 1.0, n)  # straight, and even about zero
+    total -= total.mean(axis=-2, keepdims=True)
+    slope = (part @ total) / (part @ part)
+    total -= part[:, None] * slope[..., None, :]
     noise = (white * length) ** 2 / 15
-    out: Array = np.sqrt(np.maximum((total**2).mean(axis=0) - noise, 0.0))  # (1)
+    out: Array = np.sqrt(np.maximum((total**2).mean(axis=-2) - noise, 0.0))  # (1)
     return out
 
 

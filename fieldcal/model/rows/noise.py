@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fieldcal.core.once import once_per_block
 from fieldcal.core.samples import Array, Block, Index
 from fieldcal.model.rows.block_means import mean_of_known
 from fieldcal.physics.grid_stretches import grids_by_stretch
@@ -83,6 +84,7 @@ def shared_rounding_sigma(block: Block, windows: Index, off: Array) -> Array:
     return out
 
 
+@once_per_block
 def quantisation_steps(block: Block, windows: Index) -> Array:
     """Quantisation step of each output in each window that holds a sample, (w, 6).
 
@@ -96,7 +98,9 @@ def quantisation_steps(block: Block, windows: Index) -> Array:
     grids = grids_by_stretch(block)
     for step, (a, b) in zip(steps, (w for w in windows if w[1] > w[0]), strict=False):
         step[grids.changed] = grids.within(a, b)[grids.changed]
-    return np.array(steps)
+    found = np.array(steps)
+    found.setflags(write=False)
+    return found
 
 
 def _pieces(block: Block, windows: Index) -> Iterator[list[Array]]:

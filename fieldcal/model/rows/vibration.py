@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.once import once_per_block
 from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model.rows.noise import noise_of, rounding_noise
 from fieldcal.windows.noise import ChannelNoise, short_lag_noise
@@ -85,6 +86,7 @@ def quiet_window_noise(block: Block, windows: Index, rate_hz: float) -> ChannelN
     return _compare_windows(block, windows, rate_hz)[0]
 
 
+@once_per_block
 def _compare_windows(
     block: Block, windows: Index, rate_hz: float
 ) -> tuple[ChannelNoise, Array, Mask]:
@@ -118,6 +120,8 @@ def _compare_windows(
         np.where(finest > 0, np.fmax(n, finest), n) for n in (noise.white, noise.quick)
     )
     more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0) + coarser
+    for found in (white, quick, more, loud):
+        found.setflags(write=False)
     return ChannelNoise(white, quick), more, loud
 
 

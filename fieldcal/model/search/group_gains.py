@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import blake2b
 
 import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import EqualWidthGroups
-from fieldcal.model.evidence.eliminated import evidence_gains
+from fieldcal.model.evidence.eliminated import group_directions
 from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.search.set_at_instability import (
@@ -23,7 +24,7 @@ from fieldcal.model.search.set_at_instability import (
 )
 
 MIN_CACHED_COLUMNS = 30
-"""Number of columns of a group from which its gains are cached."""
+"""Number of columns of a group from which its eigenvalues are cached."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,61 +45,79 @@ class WeightedColumns:
 
 
 class GroupGains:
-    """Calculates the gains of all groups, and caches what several sets need."""
+    """Calculates what all groups add, and caches what several sets need."""
 
     def __init__(self, sets: Sets) -> None:
         self._sets = sets
         self._weighted: dict[InstabilityIndices, WeightedColumns] = {}
-        self._wide_gains: dict[bytes, Array] = {}
+        self._wide: dict[bytes, tuple[Array, Array]] = {}
 
     def by_width(
         self, levels: Sequence[SetAtInstability]
-    ) -> Iterator[tuple[EqualWidthGroups, Array]]:
-        """Gain at each size of every group, (levels, groups, sizes), width by width."""
+    ) -> Iterator[tuple[EqualWidthGroups, Array, Array]]:
+        """Eigenvalues and q^2 of all groups, (levels, groups, k) each, width by width.
+
+        They are those of (2) of `eliminated`. The levels are those of one set.
+        """
         weighted = [self._weighted_columns(level.instability) for level in levels]
+        gram, of_set = self._sets.gram, levels[0].state.columns
+        within = gram.within.rows(gram.index[of_set])
         halves, rests = [], []
         for columns, level in zip(weighted, levels, strict=True):
-            shared = columns.rows.matrix(level.state.columns, None)
+            shared = columns.rows.rows_of(of_set, within)
             halves.append(level.state.half @ shared)
             rests.append(columns.rhs - shared.T @ level.state.estimate)
         half, rest = np.stack(halves), np.stack(rests)
+        square = np.einsum("lac,lac->lc", half, half)
         for w, alike in enumerate(self._sets.dictionary.groups_by_width):
             own = np.stack([columns.blocks[w] for columns in weighted])
-            part = np.moveaxis(half[:, :, alike.blocks], 1, 2)  # (l, b, a, k)
+            if alike.blocks.shape[1] == 1:
+                taken = square[:, alike.blocks, None]
+            else:
+                part = np.moveaxis(half[:, :, alike.blocks], 1, 2)  # (l, b, a, k)
+                taken = np.swapaxes(part, 2, 3) @ part
             typical, block = alike.typical, alike.block
-            inner = (own - np.swapaxes(part, 2, 3) @ part)[:, block]
+            inner = (own - taken)[:, block]
             inner *= typical[:, :, None] * typical[:, None, :]
             top = (np.diagonal(own, 0, 2, 3)[:, block] * typical**2).max(axis=-1)
             rhs = rest[:, alike.blocks[block]] * typical
-            yield alike, self.gains(inner, rhs, top)
+            yield alike, *self.directions(inner, rhs, top)
 
-    def gains(self, inner: Array, rhs: Array, own: Array) -> Array:
-        """Gains of groups; those of wide groups are cached by their matrices.
+    def directions(self, inner: Array, rhs: Array, own: Array) -> tuple[Array, Array]:
+        """Eigenvalues and q^2 of groups; of wide groups cached by their matrices.
 
-        A group that is not connected with a triad has the same gain at all of its
+        A group that is not connected with a triad has the same ones at all of its
         instabilities.
         """
         if inner.shape[-1] < MIN_CACHED_COLUMNS:
-            return evidence_gains(inner, rhs, own)
-        shape, k = rhs.shape[:-1], rhs.shape[-1]
+            return group_directions(inner, rhs, own)
+        shape, k = rhs.shape, rhs.shape[-1]
         inner, rhs, own = inner.reshape(-1, k, k), rhs.reshape(-1, k), own.ravel()
         keys = [
             _digest(*arrays) for arrays in zip(inner, rhs, own[:, None], strict=True)
         ]
-        new = {key: i for i, key in enumerate(keys) if key not in self._wide_gains}
+        new = {key: i for i, key in enumerate(keys) if key not in self._wide}
         at = list(new.values())
-        gains = evidence_gains(inner[at], rhs[at], own[at])
-        self._wide_gains.update(zip(new, gains, strict=True))
-        return np.array([self._wide_gains[key] for key in keys]).reshape(*shape, -1)
+        found = group_directions(inner[at], rhs[at], own[at])
+        self._wide.update(zip(new, zip(*found, strict=True), strict=True))
+        strength, power = zip(*(self._wide[key] for key in keys), strict=True)
+        return np.array(strength).reshape(shape), np.array(power).reshape(shape)
+
+    @cached_property
+    def _within(self) -> list[Array]:
+        """What does not depend on the instability, of the blocks of each width."""
+        by_width = self._sets.dictionary.groups_by_width
+        return self._sets.gram.blocks([alike.blocks for alike in by_width])
 
     def _weighted_columns(self, instability: InstabilityIndices) -> WeightedColumns:
         """Products of all columns at one instability; cached."""
         if instability not in self._weighted:
             rows = self._sets.gram_at(instability)
             by_width = self._sets.dictionary.groups_by_width
-            blocks = rows.diagonals([alike.blocks for alike in by_width])
-            columns = WeightedColumns(rows, rows.rhs(None), blocks)
-            self._weighted[instability] = columns
+            columns = [alike.blocks for alike in by_width]
+            blocks = rows.diagonals(columns, self._within)
+            weighted = WeightedColumns(rows, rows.rhs(None), blocks)
+            self._weighted[instability] = weighted
         return self._weighted[instability]
 
 

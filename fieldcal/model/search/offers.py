@@ -17,7 +17,11 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, EqualWidthGroups, Group
 from fieldcal.model.causes.smooth import MAX_COSINES
-from fieldcal.model.evidence.eliminated import Eliminated
+from fieldcal.model.evidence.eliminated import (
+    Eliminated,
+    gains_from_eigenvalues,
+    largest_gains,
+)
 from fieldcal.model.evidence.sets import Set, SetKey, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member, Sizes
 from fieldcal.model.search.group_gains import GroupGains
@@ -242,25 +246,27 @@ class Offers:
     ) -> list[BestVariants]:
         """Best variant of every cause at each level of a set."""
         best: list[BestVariants] = [{} for _ in levels]
-        for alike, gain in self._gains.by_width(levels):
+        for alike, strength, power in self._gains.by_width(levels):
             at = alike.cause
-            profile = gain + LOG_DENSITY
-            profile[:, alike.known] = -np.inf
-            profile[:, alike.known, UNIT_INDEX] = gain[:, alike.known, UNIT_INDEX]
-            size = profile.argmax(axis=2)
-            largest = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
-            level, number = np.nonzero(
-                largest >= MIN_LOG_GAIN - extra_log_odds(alike, log_prior_by_variant)
-            )
-            evidence = np.logaddexp.reduce(profile[level, number], axis=1)
+            least = MIN_LOG_GAIN - extra_log_odds(alike, log_prior_by_variant)
+            level, number = np.nonzero(largest_gains(strength, power) >= least)
+            gain = gains_from_eigenvalues(strength[level, number], power[level, number])
+            profile, known = gain + LOG_DENSITY, alike.known[number]
+            profile[known] = -np.inf
+            profile[known, UNIT_INDEX] = gain[known, UNIT_INDEX]
+            size = profile.argmax(axis=1)
+            some = gain[np.arange(len(size)), size] >= least[number]
+            level, number = level[some], number[some]
+            profile, size = profile[some], size[some]
+            evidence = np.logaddexp.reduce(profile, axis=1)
             evidence += log_prior[at[number]]
             for i, shares in log_prior_by_variant.items():
                 own = at[number] == i
                 evidence[own] += shares[alike.variant[number[own]]] - log_prior[i]
             near = evidence > log_prior[at].min() - MAX_LOG_DISTANCE
-            kept = (level[near], number[near], evidence[near])
-            for i, m, added in zip(*(part.tolist() for part in kept), strict=True):
+            kept = (part[near].tolist() for part in (level, number, size, evidence))
+            for i, m, v, added in zip(*kept, strict=True):
                 cause = self.sets.dictionary.causes[at[m]]
                 if cause not in best[i] or added > best[i][cause][0]:
-                    best[i][cause] = added, int(alike.variant[m]), int(size[i, m])
+                    best[i][cause] = added, int(alike.variant[m]), v
         return best

@@ -8,7 +8,7 @@ the same reason.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
@@ -96,13 +96,15 @@ def at_tried_instabilities(
     of that set are tried in addition to the set's own.
     """
     own, state = current.sizes, current.state
+    few = sets.gram.select_columns(state.columns)
     base = current.score - state.score - sets.instability_log_prior(own.instability)
 
     def at(
         instability: InstabilityIndices, prior_sigma: Array, cost: float = 0.0
     ) -> SetAtInstability:
         rows = sets.gram_at(instability)
-        there = Eliminated.of(rows, state.columns, prior_sigma)
+        there = Eliminated.of(rows.among(few), state.columns, prior_sigma)
+        there = replace(there, rows=rows)
         score = base + cost + there.score + sets.instability_log_prior(instability)
         return SetAtInstability(instability, there, score)
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.causes.basis import General
+from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.state import State
 from fieldcal.model.turns.attitude import (
     closures,
@@ -89,15 +89,13 @@ class EndColumns:
     step: Array
 
     @classmethod
-    def of(cls, first: int, one: General, x: Experience, state: State) -> EndColumns:
-        """Evaluate a basis with `sides`; `x` are the windows' rows."""
+    def of(cls, first: int, one: General, places: RowView) -> EndColumns:
+        """Evaluate a basis with `sides` in some positions, by `positions_about`."""
         if one.sides is None:
             raise ValueError(f"{one.name} changes nothing in positions")
-        places = np.unique(x.position)
-        plain = select_rows(x, first_row_of_each(x, places).tolist())
-        ups, downs, steps = zip(*one.sides(plain, state), strict=True)
+        ups, downs, steps = zip(*one.sides(places), strict=True)
         return cls(
-            first, places, one.per_position, TurnEnds.of(state.experienced(plain)),
+            first, places.nominal.position, one.per_position, TurnEnds.of(places.x),
             TurnEnds.stacked(map(TurnEnds.of, ups)),
             TurnEnds.stacked(map(TurnEnds.of, downs)), np.array(steps),
         )  # fmt: skip
@@ -137,3 +135,10 @@ class EndColumns:
             for some in (self.up, self.down)
         )
         return columns.ravel(), up, down, np.tile(self.step, 2)
+
+
+def positions_about(x: Experience, state: State) -> RowView:
+    """The positions of windows, by the first of their rows `x`, about a state."""
+    first = first_row_of_each(x, np.unique(x.position))
+    plain = select_rows(x, first.tolist())
+    return RowView.of(plain, plain.since_turn[None], state)

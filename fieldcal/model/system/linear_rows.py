@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LinearRows:
     """Rows of one channel, whitened.
 
@@ -41,9 +42,24 @@ class LinearRows:
             self.channel, rows, window, weight, self.columns, design, white
         )
 
+    def with_columns(self, more: LinearRows) -> LinearRows:
+        """The rows with columns more, those of the same rows in `more`."""
+        columns = np.concatenate([self.columns, more.columns])
+        design = np.hstack([self.design, more.design])
+        out = replace(self, columns=columns, design=design)
+        if "courses" in self.__dict__:
+            beside = self._product(self.design, self.means, more.design, more.means)
+            out.__dict__["means"] = np.hstack([self.means, more.means])
+            out.__dict__["courses"] = np.block(
+                [[self.courses, beside], [beside.T, more.courses]]
+            )
+        return out
+
     def select_columns(self, columns: Mask) -> LinearRows:
         """The rows with only some columns, (all,) of the dictionary."""
         kept = columns[self.columns]
+        if kept.all():
+            return self
         return replace(self, columns=self.columns[kept], design=self.design[:, kept])
 
     @property
@@ -61,8 +77,24 @@ class LinearRows:
         """Inverse variance of the mean of each window, (w,)."""
         return np.add.reduceat(self.weight**2, self.starts)
 
+    @cached_property
+    def means(self) -> Array:
+        """Mean of each column in each window, (w, k)."""
+        return self.window_means(self.design)
+
+    @cached_property
+    def courses(self) -> Array:
+        """Products of the columns' courses about their means in windows, (k, k)."""
+        return self._product(self.design, self.means, self.design, self.means)
+
+    def _product(self, a: Array, mean_a: Array, b: Array, mean_b: Array) -> Array:
+        """Products of two designs (r, ...), about their means in windows (w, ...)."""
+        out: Array = a.T @ b
+        out -= (mean_a * self.info[:, None]).T @ mean_b
+        return out
+
     def window_means(self, white: Array) -> Array:
         """Weighted mean of each window, (w, ...), of whitened rows (r, ...)."""
-        weight = self.weight.reshape(-1, *[1] * (white.ndim - 1))
-        total = np.add.reduceat(white * weight, self.starts, axis=0)
-        return total / self.info.reshape(-1, *[1] * (white.ndim - 1))
+        inside = self.windows[:, None] == self.window
+        share: Array = inside * self.weight / self.info[:, None]
+        return share @ white

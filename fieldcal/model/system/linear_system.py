@@ -22,6 +22,7 @@ from fieldcal.model.causes.basis import Course
 from fieldcal.model.causes.cause import CLOSURE, Basis
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known_rows import KnownRows
+from fieldcal.model.evidence.block_sum import BlockSum
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
@@ -53,22 +54,30 @@ class System(ABC):
 
     def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
-        table_of, off = self._about(state)
         asked = self._every_column() if wanted is None else wanted
-        out = [
+        out = self._with_columns(state, asked)
+        if wanted is None:
+            self._note_shown(out)
+        return out
+
+    def _with_columns(self, state: State, wanted: Mask) -> list[LinearRows]:
+        """Rows of the channels that wanted columns have influence on."""
+        table_of, off = self._about(state)
+        return [
             self._whitened(
                 c,
                 np.concatenate([at for at, _ in parts]),
                 np.hstack([table for _, table in parts]),
                 off[:, c],
             )
-            for c, parts in self._parts(table_of, asked).items()
+            for c, parts in self._parts(table_of, wanted).items()
             if parts
         ]
-        if wanted is None:
-            for part in out:
-                self.dictionary.shown[part.columns] |= self._shows(part)
-        return out
+
+    def _note_shown(self, linear: Sequence[LinearRows]) -> None:
+        """Note which columns rows show, in the dictionary."""
+        for part in linear:
+            self.dictionary.shown[part.columns] |= self._shows(part)
 
     @abstractmethod
     def _about(self, state: State) -> tuple[Callable[[Basis], Array], Array]:
@@ -104,9 +113,9 @@ class System(ABC):
                 continue
             if not kept.all():
                 at, table = at[kept], table[:, :, kept]
+            touched = ((table != 0.0) & used[:, :, None]).any(axis=0)
             for c, channel_parts in parts.items():
-                shown = ((table[:, c] != 0.0) & used[:, c, None]).any(axis=0)
-                if shown.any():
+                if (shown := np.flatnonzero(touched[c])).size:
                     channel_parts.append((at[shown], table[:, c, shown]))
         return parts
 
@@ -150,15 +159,25 @@ def gram(
     free = np.zeros(dictionary.width, dtype=bool)
     for j in np.flatnonzero(dictionary.unoriented):
         free[dictionary.rotations_of(held[j])] = True
+    if columns is not None:
+        linear = [part.select_columns(index >= 0) for part in linear]
     squares = [_add_windows(out, part, values, free) for part in linear]
+    blocks = [(index[part.columns], part.courses) for part in linear]
     for i, turn in enumerate(turns, len(held)):
-        squares.append(_add_turn(out, i, turn, values))
+        _add_closure(out, i, turn)
+    white = [_rows_on_way(index, turn) for turn in turns if len(turn.way)]
     if dictionary.known is not None:
-        squares.append(_add_known(out, dictionary.known))
+        white.append(_known_rows(index, dictionary.known))
+    for at, design, off in white:
+        out.rhs[at] += design.T @ off
+        squares.append(float(off @ off))
+    within = BlockSum.of(len(kept), [*blocks, *_products(white)])
+    if columns is not None:
+        within = within.select(np.arange(len(kept)))
     for j in np.flatnonzero(dictionary.unoriented):
         at = index[dictionary.rotations_of(held[j])]
         out.free_rotations[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
-    return replace(out, square=sum(squares))
+    return replace(out, within=within, square=sum(squares))
 
 
 def _empty_gram(dictionary: Dictionary, kept: Index, turns: int) -> Gram:
@@ -172,7 +191,7 @@ def _empty_gram(dictionary: Dictionary, kept: Index, turns: int) -> Gram:
     shared = np.zeros((size, 6))
     shared[:held] = dictionary.window_error
     return Gram(
-        within=np.zeros((k, k)), rhs=np.zeros(k), square=0.0,
+        within=BlockSum.of(k, ()), rhs=np.zeros(k), square=0.0,
         means=np.zeros((size, 6, k)), residual=np.zeros((size, 6)),
         info=np.zeros((size, 6)), shared=shared, free_rotations=np.zeros((size, 6, 2)),
         kind=kind, closure_errors=np.zeros((size, 6, 6)), index=index,
@@ -186,45 +205,51 @@ def _add_windows(out: Gram, part: LinearRows, values: Array, free: Mask) -> floa
     estimated. What such a rotation does within a window, where an effect turns the
     device there, stays what it is in the state.
     """
-    c, all_ = part.channel, out.index[part.columns]
-    selected = all_ >= 0
-    at = all_[selected]
-    design = part.design if selected.all() else part.design[:, selected]
+    c, at, design, mean = part.channel, out.index[part.columns], part.design, part.means
     in_state = np.where(free[part.columns], 0.0, values[part.columns])
-    white = part.white + part.design @ in_state
-    rotated = part.design @ (values[part.columns] - in_state)
-    windows, weight = part.windows, part.info
-    mean, middle = part.window_means(design), part.window_means(white)
-    inner = design.T @ design - (mean * weight[:, None]).T @ mean
-    out.within[np.ix_(at, at)] += inner
+    white = part.white + design @ in_state
+    rotated = mean @ (values[part.columns] - in_state)
+    windows, weight, middle = part.windows, part.info, part.window_means(white)
     out.rhs[at] += design.T @ white - mean.T @ (weight * middle)
     out.means[windows[:, None], c, at] = mean
-    out.residual[windows, c] = middle + part.window_means(rotated)
+    out.residual[windows, c] = middle + rotated
     out.info[windows, c] = weight
     return float(white @ white) - float(weight @ middle**2)
 
 
-def _add_known(out: Gram, known: KnownRows) -> float:
-    """Add prior knowledge of columns; returns its squares."""
-    all_ = out.index[known.columns]
-    at, design = all_[all_ >= 0], known.design[:, all_ >= 0]
-    out.within[np.ix_(at, at)] += design.T @ design
-    out.rhs[at] += design.T @ known.residual
-    return float(known.residual @ known.residual)
-
-
-def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> float:
-    """Add a turn's closure and way; returns the way's squares."""
-    all_, count = out.index[turn.columns], len(turn.closure)
-    selected = all_ >= 0
-    at = all_[selected]
+def _add_closure(out: Gram, i: int, turn: TurnRows) -> None:
+    """Add a turn's closure."""
+    every, count = out.index[turn.columns], len(turn.closure)
+    selected = every >= 0
     out.residual[i, :count], out.info[i, :count] = turn.closure, turn.info
-    out.means[i, :count, at] = turn.design[:, selected].T
+    out.means[i, :count, every[selected]] = turn.design[:, selected].T
     out.closure_errors[i, :count] = turn.closure_errors
-    if not len(turn.way):
-        return 0.0
-    on_way = selected & turn.way_design.any(axis=0)  # few: what no window shows
-    at, design = all_[on_way], turn.way_design[:, on_way]
-    out.within[np.ix_(at, at)] += design.T @ design
-    out.rhs[at] += design.T @ turn.way
-    return float(turn.way @ turn.way)
+
+
+WhiteRows = tuple[Index, Array, Array]
+"""Columns (c,) of a Gram matrix, whitened rows (r, c) of them, and right-hand side."""
+
+
+def _rows_on_way(index: Index, turn: TurnRows) -> WhiteRows:
+    """Rows of the way of a turn; few columns: what no window shows."""
+    every = index[turn.columns]
+    on_way = (every >= 0) & turn.way_design.any(axis=0)
+    return every[on_way], turn.way_design[:, on_way], turn.way
+
+
+def _known_rows(index: Index, known: KnownRows) -> WhiteRows:
+    """Rows of prior knowledge of columns."""
+    every = index[known.columns]
+    return every[every >= 0], known.design[:, every >= 0], known.residual
+
+
+def _products(white: Sequence[WhiteRows]) -> list[tuple[Index, Array]]:
+    """Products of the columns of some rows, in one block."""
+    if not white:
+        return []
+    columns = np.unique(np.concatenate([at for at, _, _ in white]))
+    block = np.zeros((len(columns), len(columns)))
+    for at, design, _ in white:
+        place = np.searchsorted(columns, at)
+        block[np.ix_(place, place)] += design.T @ design
+    return [(columns, block)]

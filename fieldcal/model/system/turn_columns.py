@@ -7,17 +7,19 @@ once, except those that need a whole turn, or that change its ends.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model.causes.basis import Course, General, RowView
-from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.sets import Set
-from fieldcal.model.system.end_columns import EndColumns
-from fieldcal.model.system.turn_force_rows import turn_force_columns
+from fieldcal.model.causes.cause import Basis
+from fieldcal.model.state import State
+from fieldcal.model.system.end_columns import EndColumns, positions_about
 from fieldcal.model.turns.turn import Turn
+from fieldcal.physics.experience import Experience
 from fieldcal.physics.experience_rows import concatenate_rows
 
 
@@ -26,13 +28,13 @@ class TurnColumns:
 
     Attributes
     ----------
-    general : columns of each basis that are used during the turn, and their outputs at
-        the edges, (m + 1, 6, j)
+    general : columns of each basis that is no course, and their outputs at the edges,
+        (m + 1, 6, j); kept if accelerometers during the turn are used
 
     """
 
-    def __init__(self, turn: Turn, view: RowView) -> None:
-        self.turn, self.view = turn, view
+    def __init__(self, turn: Turn, view: RowView, way: bool) -> None:
+        self.turn, self.view, self.way = turn, view, way
         self._weights = turn.weights(view.state.scale[3:])  # (3, m + 1, 3)
         self._columns: list[tuple[Index, Array]] = []
         self.general: list[tuple[Index, Array]] = []
@@ -60,88 +62,117 @@ class TurnColumns:
         self._columns.append((index, np.zeros((3, len(index)))))
 
     def add_outputs(
-        self,
-        index: Index,
-        outputs: Array,
-        on_way: Mask | None,
-        bent: Array | float = 0.0,
+        self, index: Index, outputs: Array, bent: Array | float = 0.0
     ) -> None:
-        """Add columns by their outputs, (m + 1, 6, k), and change of the ends, (3, k).
+        """Add columns by their outputs, (m + 1, 6, k).
 
-        Those `on_way` (k,) are used during the turn as well; none if None.
+        `bent` is how they change the closure by the ends, (3, k).
         """
         weights = self._weights.reshape(3, -1)  # (3, 3 (m + 1))
         rates = outputs[:, 3:].reshape(weights.shape[1], -1)
         self._columns.append((index, weights @ rates - bent))
-        if on_way is not None:
-            self.general.append((index[on_way], outputs[:, :, on_way]))
+        if self.way:
+            self.general.append((index, outputs))
+
+    def during_turn(self, used: Mask) -> list[tuple[Index, Array]]:
+        """The `general` columns that are `used` during the turn, (all,)."""
+        out = []
+        for index, outputs in self.general:
+            if (kept := used[index]).any():
+                out.append((index[kept], outputs[:, :, kept]))
+        return out
 
 
-def columns_of_turns(
-    turns: Sequence[Turn],
-    views: Sequence[RowView],
-    dictionary: Dictionary,
-    at_ends: Mapping[int, EndColumns],
-    known: Set | None,
-) -> list[TurnColumns]:
-    """Columns that can change each turn.
+@dataclass
+class ColumnsOfTurns:
+    """Columns that can change each turn, all about one state.
 
-    Parameters
+    The columns of a basis are calculated once, when it is first asked for.
+
+    Attributes
     ----------
-    turns, views : the turns, and their edges
-    dictionary : of the columns
-    at_ends : bases that change the inputs in positions, by their first column
-    known : set fitted to the windows, if accelerometers during turns are used; or None
+    state : of the turns
+    turns : integrated with the state
+    views : their edges
+    way : whether accelerometers during the turns are used
+    found : columns of each turn
 
     """
-    if not turns:
-        return []
-    every = _concatenate(views)
-    cut = np.cumsum([len(view.x) for view in views])[:-1]
-    loose = bool(dictionary.unoriented.any())
-    found = [TurnColumns(t, v) for t, v in zip(turns, views, strict=True)]
 
-    def on_way(columns: Index) -> Mask | None:
-        return None if known is None else turn_force_columns(columns, dictionary, known)
+    state: State
+    turns: Sequence[Turn]
+    views: Sequence[RowView]
+    way: bool
+    _held: RowView | None = field(default=None, init=False)
 
-    for first, basis in dictionary.bases:
-        if isinstance(basis, Course):
-            _add_course(found, first, basis, loose, every, cut)
-        elif first in at_ends:
-            for one in found:
-                scale = one.view.state.scale
-                columns, outputs, bent = at_ends[first].columns_for(one.turn, scale)
-                one.add_outputs(columns, outputs, on_way(columns), bent)
-        else:
-            table = _outputs(basis, views, every)
-            columns = first + np.arange(table.shape[2])
-            used = on_way(columns)
-            for one, part in zip(found, np.split(table, cut), strict=True):
-                one.add_outputs(columns, part, used)
-    return found
+    def __post_init__(self) -> None:
+        pairs = zip(self.turns, self.views, strict=True)
+        self.found = [TurnColumns(turn, view, self.way) for turn, view in pairs]
+        self._count = 0
 
+    def of_bases(
+        self,
+        bases: Sequence[tuple[int, Basis]],
+        windows: Experience,
+        loose: bool,
+    ) -> list[TurnColumns]:
+        """Columns of each turn by all of some bases, each with its first column.
 
-def _add_course(
-    found: Sequence[TurnColumns],
-    first: int,
-    course: Course,
-    loose: bool,
-    every: RowView,
-    cut: Index,
-) -> None:
-    """Add a course to all turns; if ends are `loose`, it rotates the force there."""
-    if loose:
-        for one in found:
-            one.add_still(first + np.arange(3 * course.width))
-    if course.timed:
-        tables = np.split(course.evaluate(every), cut)
-        for one, table in zip(found, tables, strict=True):
-            one.add_course(first, table)
-    elif course.while_output_stands:
-        for one in found:
-            if one.turn.standing_share is not None:
-                even = np.ones((len(one.view.x), 1))
-                one.add_course(first, even, one.turn.standing_share)
+        The bases of an earlier call come first. `windows` are the rows of the windows;
+        accelerometers rotate the force at ends that are `loose`.
+        """
+        if not self.turns:
+            return []
+        new, self._count = bases[self._count :], len(bases)
+        for first, basis in new:
+            if isinstance(basis, Course):
+                self._add_course(first, basis, loose)
+            elif basis.sides is not None:
+                self._add_at_ends(EndColumns.of(first, basis, self._places(windows)))
+            else:
+                table = _outputs(basis, self.views, self._every)
+                columns = first + np.arange(table.shape[2])
+                parts = np.split(table, self._cut)
+                for one, part in zip(self.found, parts, strict=True):
+                    one.add_outputs(columns, part)
+        return self.found
+
+    @cached_property
+    def _every(self) -> RowView:
+        """The edges of all turns."""
+        return _concatenate(self.views)
+
+    @cached_property
+    def _cut(self) -> Index:
+        """First edge of each turn but the first, among all."""
+        out: Index = np.cumsum([len(view.x) for view in self.views])[:-1]
+        return out
+
+    def _places(self, windows: Experience) -> RowView:
+        """The positions of the windows' rows; calculated once."""
+        if self._held is None:
+            self._held = positions_about(windows, self.state)
+        return self._held
+
+    def _add_at_ends(self, at_ends: EndColumns) -> None:
+        """Add a basis that changes the inputs in positions."""
+        for one in self.found:
+            one.add_outputs(*at_ends.columns_for(one.turn, self.state.scale))
+
+    def _add_course(self, first: int, course: Course, loose: bool) -> None:
+        """Add a course to all turns; it rotates the force at ends that are `loose`."""
+        if loose:
+            for one in self.found:
+                one.add_still(first + np.arange(3 * course.width))
+        if course.timed:
+            tables = np.split(course.evaluate(self._every), self._cut)
+            for one, table in zip(self.found, tables, strict=True):
+                one.add_course(first, table)
+        elif course.while_output_stands:
+            for one in self.found:
+                if one.turn.standing_share is not None:
+                    even = np.ones((len(one.view.x), 1))
+                    one.add_course(first, even, one.turn.standing_share)
 
 
 def _outputs(basis: General, views: Sequence[RowView], every: RowView) -> Array:

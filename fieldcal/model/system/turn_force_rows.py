@@ -160,10 +160,14 @@ class TurnForceRows:
         return cov + np.kron(course, np.diag(loose**2))
 
 
-def turn_force_columns(columns: Index, dictionary: Dictionary, known: Set) -> Mask:
-    """Columns used during turns: no window shows them, or the windows' set has them."""
-    held = np.isin(columns, known.state.columns)
-    return held | ~dictionary.shown[columns]
+def turn_force_columns(dictionary: Dictionary, known: Set) -> Mask:
+    """Columns used during turns, (all,).
+
+    No window shows them, or the windows' set has them.
+    """
+    used = ~dictionary.shown
+    used[known.state.columns] = True
+    return used
 
 
 def settling_amplitudes(state: State, x: Experience, since: Array) -> Array:

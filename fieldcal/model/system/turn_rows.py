@@ -11,7 +11,6 @@ Source: rotation kinematics to first order in phi.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,17 +18,20 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
-from fieldcal.model.causes.basis import General, RowView
+from fieldcal.model.causes.basis import RowView
 from fieldcal.model.causes.cause import triads_of
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.unfitted_groups import eliminate_with, parameters_not_in
 from fieldcal.model.rows.hand_tremor import turned_force
 from fieldcal.model.state import State, Term
-from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.linear_rows import LinearRows
-from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
-from fieldcal.model.system.turn_force_rows import TurnForceRows, settling_amplitudes
+from fieldcal.model.system.turn_columns import ColumnsOfTurns, TurnColumns
+from fieldcal.model.system.turn_force_rows import (
+    TurnForceRows,
+    settling_amplitudes,
+    turn_force_columns,
+)
 from fieldcal.model.system.window_ends import WindowEnds, closure_slopes, output_slopes
 from fieldcal.model.turns.attitude import turn_geometry
 from fieldcal.model.turns.turn import Turn
@@ -93,12 +95,11 @@ class Turns:
         self.first = np.unique(self.rows.x.position, return_index=True)[1]
         self.wander = self.rows.hand_angle[self.first]
         self.way = way and not dictionary.unoriented.any()
+        self._columns: ColumnsOfTurns | None = None
 
     def with_dictionary(self, dictionary: Dictionary) -> Turns:
         """The same turns with the columns of a copy of the dictionary."""
-        out = copy(self)
-        out.dictionary = dictionary
-        return out
+        return Turns(self.tracker, dictionary, self.way)
 
     def linearised(
         self,
@@ -114,21 +115,31 @@ class Turns:
         """
         seen = self.way and known is not None and not _has_unknown_acc_cause(known)
         self.known = self._with_factory_errors(known) if known and seen else None
-        self.at_ends = {
-            first: EndColumns.of(first, one, self.rows.x, state)
-            for first, one in self.dictionary.bases
-            if isinstance(one, General) and one.sides is not None
-        }
-        if self.dictionary.unoriented.any():
+        if self.known is not None:
+            self.used = turn_force_columns(self.dictionary, self.known)
+        unoriented = bool(self.dictionary.unoriented.any())
+        if unoriented:
             self.windows = WindowEnds.of(windows, self.dictionary)
             x, since = select_rows(self.rows.x, self.first), self.dictionary.since
             self.slopes = output_slopes(state, x, since[:, self.first])
-        turns = list(self.tracker.turns(state))
-        views = [self._view(turn, state) for turn in turns]
-        met = columns_of_turns(turns, views, self.dictionary, self.at_ends, self.known)
-        return _drop_shaken_way(
-            [self._rows(*one, values) for one in zip(turns, views, met, strict=True)]
-        )
+        about = self._about(state)
+        met = about.of_bases(self.dictionary.bases, self.rows.x, unoriented)
+        each = zip(about.turns, about.views, met, strict=True)
+        rows = _drop_shaken_way([self._rows(*one, values) for one in each])
+        if self.known is not None:
+            self._columns = None  # the outputs along all turns are large
+        return rows
+
+    def _about(self, state: State) -> ColumnsOfTurns:
+        """The turns integrated with a state, with their columns.
+
+        They are kept until the accelerometers were used, or another state is asked for.
+        """
+        if self._columns is None or self._columns.state is not state:
+            turns = list(self.tracker.turns(state))
+            views = [self._view(turn, state) for turn in turns]
+            self._columns = ColumnsOfTurns(state, turns, views, self.way)
+        return self._columns
 
     def outputs_of_terms(
         self, turns: Sequence[Turn], state: State, terms: Sequence[Term]
@@ -167,7 +178,8 @@ class Turns:
         _, residual, across = turn_geometry(
             turn.ends, turn.positions, turn.attitude, turn.done
         )
-        index, close, general = met.index, met.closing, met.general
+        index, close = met.index, met.closing
+        general = met.during_turn(self.used) if self.known is not None else []
         loose: dict[int, Array] = {}
         if d.unoriented.any():
             loose = dict(closure_slopes(turn, d.window_positions, self.slopes))

@@ -59,7 +59,7 @@ class WindowEnds:
             if part.channel >= 3:
                 continue
             there, c = part.windows, part.channel
-            means[there[:, None], c, part.columns] = part.window_means(part.design)
+            means[there[:, None], c, part.columns] = part.means
             residuals[there, c] = part.window_means(part.white)
             variances[there, c] += 1 / part.info
             at = np.flatnonzero(np.isin(turning, part.columns))
@@ -122,7 +122,7 @@ def closure_slopes(
     """
     ends = turn.ends
     rows = first_row_of_each(ends, turn.positions)
-    forces, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
+    forces, held = ends.f[rows], np.repeat(ends.to_device_in(rows)[None], 3, axis=0)
     for i, p in enumerate(turn.positions):
         j = int(np.searchsorted(positions, p))
         up = forces[i] / np.linalg.norm(forces[i])

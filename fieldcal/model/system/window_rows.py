@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
@@ -28,6 +28,25 @@ class WindowSystem(System):
     def __init__(self, rows: Rows, dictionary: Dictionary) -> None:
         super().__init__(dictionary)
         self.rows = rows
+        self._last: tuple[State, int, list[LinearRows]] | None = None
+
+    def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
+        """Rows of every channel about a state, with all columns or those wanted.
+
+        Those with all columns are kept, until another state is asked for. Columns that
+        were added to the dictionary since are added to them.
+        """
+        if wanted is not None:
+            return super().linearised(state, wanted)
+        count, width, rows = 0, self.dictionary.width, list[LinearRows]()
+        if self._last is not None and self._last[0] is state:
+            _, count, rows = self._last
+        if count < width:
+            new = self._with_columns(state, np.arange(width) >= count)
+            self._note_shown(new)
+            rows = _joined(rows, new)
+            self._last = state, width, rows
+        return rows
 
     def independent_copy(self) -> Self:
         """The same rows with a copy of the dictionary."""
@@ -89,3 +108,12 @@ class WindowSystem(System):
         size = (np.abs(part.design) / part.weight[:, None]).max(axis=0)
         shows: Mask = size * self.dictionary.typical[part.columns] > MIN_VISIBLE_ACC
         return shows
+
+
+def _joined(rows: Sequence[LinearRows], more: Sequence[LinearRows]) -> list[LinearRows]:
+    """Rows of channels, with the columns of both, the channels in their order."""
+    by_channel = {part.channel: part for part in rows}
+    for part in more:
+        own = by_channel.get(part.channel)
+        by_channel[part.channel] = part if own is None else own.with_columns(part)
+    return [by_channel[c] for c in sorted(by_channel)]

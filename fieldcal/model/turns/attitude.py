@@ -129,7 +129,7 @@ def turn_geometry(
 
     """
     ends = first_row_of_each(x, pair)
-    f, held = x.f[ends], x.to_device[ends]
+    f, held = x.f[ends], x.to_device_in(ends)
     (closure,), (whole,) = closures(f[None], held[None], attitude[-1])
     known = np.eye(3)
     if not whole:

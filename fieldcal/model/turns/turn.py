@@ -21,18 +21,19 @@ rotation kinematics to first order in phi.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from fieldcal.core.derivative import derivative
-from fieldcal.core.rotation import cross
+from fieldcal.core.rotation import cross_matrix
 from fieldcal.core.running_integral import running_integral
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.turns.attitude import trapezoid_means, turn_geometry
 from fieldcal.physics.experience import Experience
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Turn:
     """One turn, in m fine steps between m + 1 edges, grouped into k pieces.
 
@@ -83,18 +84,23 @@ class Turn:
         return turn_geometry(self.ends, self.positions, self.attitude, self.done)[1]
 
     def means(self, values: Array) -> Array:
-        """Means over the pieces, (k, ...), of values at the edges, (m + 1, ...).
+        """Means over the pieces, (k, ...), of values at the edges, (m + 1, ...)."""
+        flat = self.piece_weights @ values.reshape(len(values), -1)
+        return flat.reshape(-1, *values.shape[1:])
 
-        They are those that the trapezoid rule gives for samples `interval` apart. The
-        difference of the rule with steps from edge to edge is removed by the next term
-        of Euler and Maclaurin, -dt^2/12 (v'(b) - v'(a)).
+    @cached_property
+    def piece_weights(self) -> Array:
+        """Weights (k, m + 1) of the values at the edges in the means over the pieces.
+
+        The means are those that the trapezoid rule gives for samples `interval` apart.
+        The difference of the rule with steps from edge to edge is removed by the next
+        term of Euler and Maclaurin, -dt^2/12 (v'(b) - v'(a)).
         """
-        t = self.x.t
-        mean = trapezoid_means(t, values, self.cut)
+        t, each = self.x.t, np.eye(len(self.x.t))
         step = float(np.ptp(t)) / (len(t) - 1)
-        slope = derivative(t, values)[self.cut]
-        length = np.diff(t[self.cut]).reshape(-1, *[1] * (values.ndim - 1))
-        mean_curvature: Array = np.diff(slope, axis=0) / length
+        slope = np.diff(derivative(t, each)[self.cut], axis=0)
+        mean_curvature = slope / np.diff(t[self.cut])[:, None]
+        mean = trapezoid_means(t, each, self.cut)
         return mean - (step**2 - self.interval**2) / 12 * mean_curvature
 
     def weights(self, scale: Array) -> Array:
@@ -113,7 +119,7 @@ class Turn:
 
         `rate_error` (m + 1, 3, k) are k courses of rate errors dW / s, rad/s.
         """
-        at_start = np.einsum("mji,mjk->mik", self.attitude, rate_error)  # axes of p
+        at_start = np.swapaxes(self.attitude, 1, 2) @ rate_error  # axes of p
         phi = running_integral(self.x.t, at_start)
         out: Array = phi - self.done[:, None, None] * phi[-1]
         return out
@@ -124,6 +130,5 @@ class Turn:
         `phi` (m + 1, 3, k) are attitude errors, rad in device axes at p.
         """
         force = self.ends.f[self.ends.position == self.positions[0]].mean(axis=0)
-        crossed = cross(np.moveaxis(phi, 1, 2), force)
-        out: Array = np.einsum("mij,mkj->mik", self.attitude, crossed)
+        out: Array = (self.attitude @ -cross_matrix(force)) @ phi  # phi x f = -f x phi
         return out

@@ -24,7 +24,6 @@ from fieldcal.model.turns.attitude import (
     interpolate_vectors,
     sampling_error,
     trapezoid_means,
-    turn_geometry,
 )
 from fieldcal.model.turns.integration import (
     IntegratedTurn,
@@ -97,26 +96,24 @@ class TurnTracker:
 
     def turns(self, state: State) -> Iterator[Turn]:
         """Every turn that could be integrated with a state."""
-        ends = state.experienced(self.rows.x)
+        ends, delay = state.experienced(self.rows.x), state.lag.delay
+        bias, scale = state.bias[3:], state.scale[3:]
         self.contradicted_turns = []
-        for pair, first, last in self.legs:
-            turn = self._turn(state, ends, pair, first, last)
+        for pair, *samples in self.legs:
+            leg = Leg(self.source, ends, bias, scale, delay, pair, *samples)
+            turn = self._turn(state, leg)
             if turn is not None:
                 sway_sigma = np.sqrt(self.sway_variances[pair])
                 sigma = float(np.hypot(turn.closure_sigma, sway_sigma))
                 yield replace(turn, closure_sigma=sigma)
 
-    def _turn(
-        self, state: State, ends: Experience, pair: tuple[int, int], a: int, b: int
-    ) -> Turn | None:
+    def _turn(self, state: State, leg: Leg) -> Turn | None:
         """Integrate a turn, corrected for the state's other gyroscope errors.
 
-        `ends` are the inputs in the windows, `pair` the windows, and samples [a, b) the
-        motion. None if the motion is too short, if the attitude at its end contradicts
-        the position q, or if the device turned by less than `MIN_TURN_RAD`.
+        None if the motion is too short, if the attitude at its end contradicts the
+        window that it leads to, or if the device turned by less than `MIN_TURN_RAD`.
         """
-        bias, scale, delay = state.bias[3:], state.scale[3:], state.lag.delay
-        leg = Leg(self.source, ends, bias, scale, delay, pair, a, b)
+        ends, pair = leg.x, leg.pair
         if (steps := divide_into_steps(leg)) is None:
             return None
         integrated, force_before_effects, x = self._corrected(leg, steps, state)
@@ -145,7 +142,7 @@ class TurnTracker:
             turn,
             standing_share=self.standing.share(gyr, edge),
             rounding_covariance=self.standing.closure_covariance(
-                steps.t, gyr, scale, edge, integrated.attitude
+                steps.t, gyr, leg.scale, edge, integrated.attitude
             ),
         )
 
@@ -158,9 +155,11 @@ class TurnTracker:
         3), and the inputs there with them.
         """
         correction: Array = np.zeros((len(steps.edge), 3))
+        rows = first_row_of_each(leg.x, leg.pair)
+        forces, held = leg.x.f[rows], leg.x.to_device_in(rows)
         for _ in range(MAX_CORRECTIONS):
             integrated = integrate_turn(leg, steps, correction)
-            x = self._edges(leg, steps, integrated)
+            x = self._edges(leg, steps, integrated, forces, held)
             force_before_effects, x = x.f, apply_way_effects(x, state)
             before, since = correction, self.time_since_turn(steps.at, leg.pair[1])
             correction = other_gyro_errors(state, x, since)
@@ -179,13 +178,23 @@ class TurnTracker:
         since = t - turn_end[:, None]
         return np.where(since >= 0, since, np.inf)
 
-    def _edges(self, leg: Leg, steps: Steps, integrated: IntegratedTurn) -> Experience:
-        """Inputs of the device at the edges of the steps, by the gyroscopes."""
-        ends, pair, t = leg.x, leg.pair, steps.at
+    def _edges(
+        self,
+        leg: Leg,
+        steps: Steps,
+        integrated: IntegratedTurn,
+        forces: Array,
+        held: Array,
+    ) -> Experience:
+        """Inputs of the device at the edges of the steps, by the gyroscopes.
+
+        `forces` (2, 3) and direction cosines `held` (2, 3, 3) are those in both
+        positions.
+        """
+        ends, t = leg.x, steps.at
         attitude, done = integrated.attitude, integrated.done
-        f, _, _ = turn_geometry(ends, pair, attitude, done)
+        f = interpolate_vectors(attitude, done, *forces)
         w = integrated.rate[steps.edge]
-        held = ends.to_device[first_row_of_each(ends, pair)]
         warming, heating = self.source.thermometer.at(t)
         unknown = np.full(len(t), np.nan)
         out = Experience.at_rest(

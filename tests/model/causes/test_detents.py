@@ -72,9 +72,10 @@ def test_a_column_is_the_change_of_the_force_with_the_angle_of_its_positions() -
     first, end, basis = list(d.basis_ranges())[-1]
     assert (first, end) == (before, d.width) and isinstance(basis, General)
     state = nominal()
-    found = basis.evaluate(RowView.of(x, np.array([x.since_turn]), state))
+    view = RowView.of(x, np.array([x.since_turn]), state)
+    found = basis.evaluate(view)
     assert basis.sides is not None
-    for k, (up, down, step) in enumerate(basis.sides(x, state)):
+    for k, (up, down, step) in enumerate(basis.sides(view)):
         one, h = some[k], 1e-5
         turned = h * np.isin(x.position, one.positions)
         a, b = (turned, 0.0) if one.joint == 0 else (0.0, turned)

@@ -14,7 +14,12 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known_rows import KnownRows
-from fieldcal.model.evidence.eliminated import Eliminated, evidence_gains
+from fieldcal.model.evidence.eliminated import (
+    Eliminated,
+    evidence_gains,
+    gains_from_eigenvalues,
+    largest_gains,
+)
 from fieldcal.model.priors import SIZES
 from fieldcal.model.system.linear_system import gram
 
@@ -37,11 +42,14 @@ def test_information_is_that_of_the_rows(seed: int, free: tuple[int, ...]) -> No
     rows, every = one.gram.with_instability(TAU), np.arange(WIDTH)
     inner, rhs = one.dense.information()
     assert_agree(rows.matrix(every, every), inner[:WIDTH, :WIDTH])
-    assert_agree(rows.matrix(SET, None), inner[SET])
+    within = one.gram.within.rows(SET)
+    assert_agree(rows.rows_of(SET, within), inner[SET])
     assert_agree(rows.rhs(SET), rhs[SET])
     assert_agree(rows.rhs(None), rhs)
     blocks = [np.array([[0, 1], [5, 2]]), np.array([[8]])]
-    for at, found in zip(blocks, rows.diagonals(blocks), strict=True):
+    for at, found in zip(
+        blocks, rows.diagonals(blocks, one.gram.blocks(blocks)), strict=True
+    ):
         for block, there in zip(at, found, strict=True):
             assert_agree(there, inner[np.ix_(block, block)])
 
@@ -171,7 +179,7 @@ def test_what_elimination_leaves_by_rounding_gains_nothing(seed: int) -> None:
 def test_some_columns_say_the_same_as_they_do_among_all(free: tuple[int, ...]) -> None:
     whole = case(2, free).gram
     part = whole.select_columns(np.array([7, 0, 4, 3, 3]))
-    assert part.within.shape == (4, 4)
+    assert part.within.size == 4
     found, same = (
         Eliminated.of(g.with_instability(TAU), SET, WIDE) for g in (part, whole)
     )
@@ -226,6 +234,24 @@ def test_of_what_is_known_before_only_wanted_columns_count() -> None:
         unoriented=np.zeros(1, bool),
     )
     found = gram([], cast(Dictionary, some), np.zeros(3), (), np.array([2, 1]))
-    np.testing.assert_allclose(found.within, [[0.0, 0.0], [0.0, 2.0]])
+    every = np.arange(2)
+    np.testing.assert_allclose(
+        found.within.part(every, every), [[0.0, 0.0], [0.0, 2.0]]
+    )
     np.testing.assert_allclose(found.rhs, [0.0, 4.0])
     assert found.square == pytest.approx(8.0)
+
+
+@SEEDS
+def test_no_size_gains_more_than_each_direction_at_a_size_of_its_own(seed: int) -> None:
+    """One direction gains as much at the best size; several do at the same best one."""
+    rng = np.random.default_rng(seed)
+    strength = np.exp(rng.normal(0.0, 3.0, (50, 3)))
+    power = strength * np.exp(rng.normal(1.0, 1.0, (50, 3)))
+    strength[:5, 0] = power[:5, 0] = 0.0  # a direction that the rows do not determine
+    fine = np.exp(np.linspace(-15.0, 15.0, 4001))
+    for s, p in ((strength, power), (strength[:, :1], power[:, :1])):
+        bound = largest_gains(s, p)
+        best = gains_from_eigenvalues(s, p, fine).max(axis=1)
+        assert (best <= bound + 1e-9).all()
+    np.testing.assert_allclose(best[5:], bound[5:], rtol=1e-4, atol=1e-5)

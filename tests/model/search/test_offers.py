@@ -10,6 +10,7 @@ import pytest
 from small_sessions import Session, ladder
 
 from fieldcal.model import priors
+from fieldcal.model.evidence.eliminated import gains_from_eigenvalues, largest_gains
 from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
 from fieldcal.model.search import offers
@@ -92,10 +93,13 @@ def test_wide_groups_are_looked_up_where_rows_say_the_same_of_them() -> None:
     root = rng.standard_normal((3, 40, 40))
     inner = root @ root.swapaxes(1, 2)
     rhs, own = rng.standard_normal((3, 40)), np.full(3, 80.0)
-    gains = GroupGains(search.sets).gains
-    found = gains(inner, rhs, own)
-    again = gains(inner[::-1], rhs[::-1], own)
-    np.testing.assert_array_equal(found, again[::-1])
+    directions = GroupGains(search.sets).directions
+    both = directions(inner, rhs, own)
+    again = directions(inner[::-1], rhs[::-1], own)
+    for one, other in zip(both, again, strict=True):
+        np.testing.assert_array_equal(one, other[::-1])
+    found = gains_from_eigenvalues(*both)
+    assert (found.max(axis=1) <= largest_gains(*both)).all()
     at = int(np.argmin(np.abs(np.log(priors.SIZES))))
     v = float(priors.SIZES[at])
     for i in range(3):

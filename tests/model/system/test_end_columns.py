@@ -15,7 +15,7 @@ from fieldcal.model.causes import columns
 from fieldcal.model.causes.basis import General
 from fieldcal.model.causes.effect_columns import effect_basis
 from fieldcal.model.state import State, Term
-from fieldcal.model.system.end_columns import EndColumns
+from fieldcal.model.system.end_columns import EndColumns, positions_about
 from fieldcal.model.turns.attitude import turn_geometry
 from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience import Experience
@@ -67,7 +67,9 @@ def test_small_rotations_are_met_at_both_ends_and_nowhere_else(x: Experience) ->
     sides = columns.small_rotation_sides
     basis = General("aside", columns.small_rotation, sides=sides, per_position=True)
     one = turn(x)
-    at, outputs, moved = EndColumns.of(5, basis, x, STATE).columns_for(one, SCALE)
+    at, outputs, moved = EndColumns.of(5, basis, positions_about(x, STATE)).columns_for(
+        one, SCALE
+    )
     np.testing.assert_array_equal(at, 5 + np.array([4, 5, 6, 7]))
     for k, (p, i) in enumerate([(2, 0), (2, 1), (3, 0), (3, 1)]):
         both = []
@@ -83,7 +85,9 @@ def test_small_rotations_are_met_at_both_ends_and_nowhere_else(x: Experience) ->
 def test_an_effect_is_met_at_both_ends_at_once() -> None:
     effect = catalogue()["angle_offset"]
     basis, one = effect_basis(effect, {}, 0), turn(ALL)
-    at, outputs, moved = EndColumns.of(40, basis, ALL, STATE).columns_for(one, SCALE)
+    at, outputs, moved = EndColumns.of(
+        40, basis, positions_about(ALL, STATE)
+    ).columns_for(one, SCALE)
     np.testing.assert_array_equal(at, [40, 41])
     for k in range(2):
         both = []
@@ -98,4 +102,4 @@ def test_an_effect_is_met_at_both_ends_at_once() -> None:
 
 def test_what_changes_nothing_in_positions_is_refused() -> None:
     with pytest.raises(ValueError, match="bias changes nothing in positions"):
-        EndColumns.of(0, General("bias", columns.bias), ALL, STATE)
+        EndColumns.of(0, General("bias", columns.bias), positions_about(ALL, STATE))

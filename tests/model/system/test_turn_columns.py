@@ -2,55 +2,125 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any, cast
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmarks.concealed import kinds
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.basis import Course, RowView
-from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
-from fieldcal.model.system import turn_rows
-from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
+from fieldcal.model.system.turn_columns import ColumnsOfTurns, TurnColumns
+from fieldcal.model.system.turn_force_rows import turn_force_columns
 from fieldcal.model.turns.turn import Turn
+from fieldcal.model.turns.turn_tracker import TurnTracker
 from fieldcal.physics.experience import Experience
 
 
-def test_all_turns_at_once_are_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+def turned_fit(kind: str) -> tuple[GaussNewton, TurnTracker]:
+    """The fit of a session with turns, and what integrates them."""
+    session = kinds()[kind][0](np.random.default_rng(3))
+    fit = build_fit(prepare_recording(session.record(3), session.about))
+    assert fit.turns is not None
+    return fit, fit.turns.tracker
+
+
+def test_all_turns_at_once_are_each_by_itself() -> None:
     """With every column that a session has, on the way as well."""
-    seen: list[tuple[TurnColumns, TurnColumns]] = []
-
-    def both(turns: list[Turn], views: list[RowView], *known: Any) -> list[TurnColumns]:
-        out = columns_of_turns(turns, views, *known)
-        for turn, view, met in zip(turns, views, out, strict=True):
-            (alone,) = columns_of_turns([turn], [view], *known)
-            seen.append((met, alone))
-        return out
-
-    monkeypatch.setattr(turn_rows, "columns_of_turns", both)
-    session = kinds()["gyro_scale"][0](np.random.default_rng(3))
-    prepared = prepare_recording(session.record(3), session.about)
-    fit = build_fit(prepared)
-    (scale,) = [c for c in fit.dictionary.causes if c.key == "gyro_scale"]
-    nothing = np.zeros(fit.dictionary.width)
+    fit, tracker = turned_fit("gyro_scale")
+    d = fit.dictionary
+    (scale,) = [c for c in d.causes if c.key == "gyro_scale"]
     for members in ((), ((scale, scale.variants[0]),)):
-        state, values, best = fit.settle(fit.nominal, nothing, members)
+        state, values, best = fit.settle(fit.nominal, np.zeros(d.width), members)
         fit.gram(state, values, best)
+        turns = list(tracker.turns(state))
+        since = [tracker.time_since_turn(turn.t, turn.positions[1]) for turn in turns]
+        views = [
+            RowView(turn.x, turn.x, time, state)
+            for turn, time in zip(turns, since, strict=True)
+        ]
+        known = d.bases, tracker.rows.x, False
+        every = ColumnsOfTurns(state, turns, views, True).of_bases(*known)
+        assert len(every) > 5 and all(met.general for met in every)
+        for turn, view, met in zip(turns, views, every, strict=True):
+            (alone,) = ColumnsOfTurns(state, [turn], [view], True).of_bases(*known)
+            assert_same_columns(met, alone, turn_force_columns(d, best))
     assert [t.effect.id for t in state.terms] == ["gyro_scale"]
-    assert len(seen) > 10 and any(met.general for met, _ in seen)
-    for met, alone in seen:
-        np.testing.assert_array_equal(met.index, alone.index)
-        np.testing.assert_allclose(met.closing, alone.closing, rtol=1e-12, atol=1e-300)
-        for (columns, outputs), (own, other) in zip(
-            met.general, alone.general, strict=True
-        ):
-            np.testing.assert_array_equal(columns, own)
-            np.testing.assert_allclose(outputs, other, rtol=1e-12, atol=1e-300)
+
+
+def test_rows_about_the_same_state_are_linearised_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Once more only for what was added; they are those of a fit that asks first."""
+    fit, tracker = turned_fit("bias_drift")
+    state, values, best = fit.settle(fit.nominal, np.zeros(fit.dictionary.width), ())
+    other = fit.continuing_copy()
+    calls: list[State] = []
+    turned = TurnTracker.turns
+
+    def counted(tracker: TurnTracker, state: State) -> Iterator[Turn]:
+        calls.append(state)
+        yield from turned(tracker, state)
+
+    monkeypatch.setattr(TurnTracker, "turns", counted)
+    fit.gram(state, values, None)
+    linear = fit.system.linearised(state)
+    for each in (fit.dictionary, other.dictionary):
+        each.add_course("new", lambda x: np.sin(x.t)[:, None], 1, True)
+        each.add_causes([])
+    again = fit.gram(state, values, best)
+    assert calls == [state]
+    new = fit.system.linearised(state)
+    for before, after in zip(linear, new, strict=True):
+        assert before.design.shape[1] + 1 == after.design.shape[1]
+    first = other.gram(state, values, best)
+    every = np.arange(fit.dictionary.width)
+    assert_near(again.within.part(every, every), first.within.part(every, every))
+    for name in ("rhs", "means", "residual", "info", "closure_errors"):
+        assert_near(getattr(again, name), getattr(first, name))
+
+
+def assert_near(found: Array, same: Array) -> None:
+    np.testing.assert_allclose(found, same, rtol=1e-9, atol=1e-9 * np.abs(same).max())
+
+
+def assert_same_columns(one: TurnColumns, other: TurnColumns, used: Mask) -> None:
+    np.testing.assert_array_equal(one.index, other.index)
+    np.testing.assert_allclose(one.closing, other.closing, rtol=1e-12, atol=1e-300)
+    for (columns, outputs), (own, alone) in zip(
+        one.during_turn(used), other.during_turn(used), strict=True
+    ):
+        np.testing.assert_array_equal(columns, own)
+        np.testing.assert_allclose(outputs, alone, rtol=1e-12, atol=1e-300)
+
+
+def test_a_basis_added_later_has_the_columns_that_it_has_from_the_start() -> None:
+    """And those of a basis that is there already are not calculated again."""
+    calls: list[str] = []
+
+    def level(name: str) -> Course:
+        def evaluate(view: RowView) -> Array:
+            calls.append(name)
+            return np.full((len(view.x), 1), len(name))
+
+        return Course(name, evaluate, 1, timed=True)
+
+    bases = [(0, level("one")), (6, level("three"))]
+    turn, view = turn_about_z()
+    later = ColumnsOfTurns(view.state, [turn], [view], False)
+    later.of_bases(bases[:1], turn.ends, False)
+    (found,) = later.of_bases(bases, turn.ends, False)
+    assert calls == ["one", "three"]
+    (at_once,) = ColumnsOfTurns(view.state, [turn], [view], False).of_bases(
+        bases, turn.ends, False
+    )
+    np.testing.assert_array_equal(found.index, at_once.index)
+    np.testing.assert_array_equal(found.closing, at_once.closing)
 
 
 RATE, SECONDS = 0.3, 4.0
@@ -76,10 +146,9 @@ LEVEL = Course("level", lambda view: np.ones((len(view.x), 1)), 1, timed=True)
 
 def seen(course: Course, unoriented: bool, *turns: tuple[Turn, RowView]) -> list[Any]:
     """Columns in some turns: of a level the first, of a course from 10 on."""
-    bases = [(0, LEVEL), (10, course)]
-    some = SimpleNamespace(bases=bases, unoriented=np.array([unoriented]))
     along, views = zip(*turns, strict=True)
-    return columns_of_turns(along, views, cast(Dictionary, some), {}, None)
+    met = ColumnsOfTurns(views[0].state, along, views, False)
+    return met.of_bases([(0, LEVEL), (10, course)], along[0].ends, unoriented)
 
 
 def closing_of(found: TurnColumns, index: int) -> Array:

@@ -121,8 +121,9 @@ def test_only_what_acts_on_the_way_moves_what_is_felt_there() -> None:
 def test_sides_of_small_rotations_are_their_columns() -> None:
     """All positions at once, of which each has its own columns."""
     x, state = ladder(2), nominal()
-    whole = columns.small_rotation(RowView.of(x, x.since_turn[None], state))
-    pairs = list(columns.small_rotation_sides(x, state))
+    view = RowView.of(x, x.since_turn[None], state)
+    whole = columns.small_rotation(view)
+    pairs = list(columns.small_rotation_sides(view))
     assert len(pairs) == 2
     for joint, (up, down, step) in enumerate(pairs):
         assert step == 1e-5

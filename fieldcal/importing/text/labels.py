@@ -16,20 +16,17 @@ the beginning was written by the serial monitor.
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 
 from fieldcal.importing.text.log_prefixes import STAMP, TICKS, TIME, log_prefix
+from fieldcal.importing.text.repeated_lines import NUMBER
 from fieldcal.importing.words.heading_units import parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.importing.words.sensor_words import AXES
 
 CLOCKS = frozenset((TIME, TICKS, STAMP))
 """Names that each line of a row may have."""
-
-MIN_LABEL_SHARE = 0.5
-"""Share of the commonest label's lines in which others are no column."""
 
 MAX_UNIT_LETTERS = 12
 """Letters of a unit; what is longer is a sentence."""
@@ -40,28 +37,25 @@ LONGEST = 2000
 SHAPES = 256
 """Kinds of lines whose names are remembered: a program prints a few."""
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_LIST = re.compile(
-    rf"(?<=[:=])\s*[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]"
-)
+_LIST = re.compile(rf"(?<=[:=])\s*[\[({{<]\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*[\])}}>]")
 _LISTED = re.compile(
-    rf"(\([^()]*\)|[A-Za-z])\s*\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]"
+    rf"(\([^()]*\)|[A-Za-z])\s*\[\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*\]"
 )
 """Values in a list right behind a label or its unit in brackets."""
 
 _DICT = re.compile(
     r"[{(]\s*"
-    + r"\s*,\s*".join(rf"['\"]?{a}['\"]?\s*[:=]\s*({_NUMBER})" for a in AXES)
+    + r"\s*,\s*".join(rf"['\"]?{a}['\"]?\s*[:=]\s*({NUMBER})" for a in AXES)
     + r"\s*[})]",
     re.IGNORECASE,
 )
 """Three axes as Python prints them, or JavaScript."""
 
-_PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{_NUMBER}[\s,;|]*){{3,}}")
-_PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={_NUMBER})")
+_PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{NUMBER}[\s,;|]*){{3,}}")
+_PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={NUMBER})")
 """Labels with a space before their value, where a line holds nothing else."""
 
-_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({_NUMBER}\D*)")
+_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({NUMBER}\D*)")
 """A label with its value alone in a line, as programs print a temperature."""
 
 _SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
@@ -71,7 +65,7 @@ _IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| ?[(\[]([^()\[\]]+)[)\]])( [xyzXYZ])
 """A label that says the unit of its values."""
 
 _LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
-_VALUES = re.compile(rf"\s*({_NUMBER}(?:[\s,;|]+{_NUMBER})*)\s*(.*)", re.DOTALL)
+_VALUES = re.compile(rf"\s*({NUMBER}(?:[\s,;|]+{NUMBER})*)\s*(.*)", re.DOTALL)
 _STEM = re.compile(r"(.*[^\s_])[\s_]*[xyzXYZ]")
 """A label that ends with an axis, and what the other axes have before it."""
 
@@ -86,7 +80,7 @@ _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
 """A line that holds nothing but a name."""
 
-_PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({_NUMBER})(?:\|\w*)?")
+_PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({NUMBER})(?:\|\w*)?")
 """A name, ms since 1970 and a value, as Teleplot reads them."""
 
 LEVEL = re.compile(
@@ -105,9 +99,6 @@ _NAME = re.compile(r"\W*[A-Za-z][\w-]*:(?!\S)\W*")
 
 _LETTER = re.compile("[A-Za-z_:]")
 """What a line with labels has, and one of numbers alone has not."""
-
-_WORD = re.compile(r"[A-Za-z_]\w*")
-_NAMED = re.compile(r"([A-Za-z_]\w*)\s*[:=]")
 
 _OF_ALL = {"", "xyz", "value", "values", "data", "axes"}
 """Words before an axis that say that others follow."""
@@ -148,7 +139,7 @@ def labelled_values(line: str) -> list[Labelled]:
     parts, values = [], []
     for label, text in split:
         said = _VALUES.fullmatch(text)
-        behind = re.findall(_NUMBER, said[1]) if said else []
+        behind = re.findall(NUMBER, said[1]) if said else []
         if said is None or len(behind) not in (1, len(AXES)):
             return []
         values += behind
@@ -304,34 +295,3 @@ def _with_unit(read: Sequence[NamedUnit], unit: str) -> list[NamedUnit]:
         return name == last or bool(stem and other and other[1] == stem[1])
 
     return [(n, u or (unit if mine(n) else "")) for n, u in read]
-
-
-def line_shape(line: str) -> str:
-    """A line without its numbers: the constant text of a program's output.
-
-    >>> line_shape("Temperature 25.31 deg C") == line_shape("Temperature -1 deg C")
-    True
-    """
-    return re.sub(_NUMBER, "", line).strip()
-
-
-def repeated_shapes(lines: Iterable[str], names: Iterable[str]) -> set[str]:
-    """Shapes that come more than once, of lines that say none of these names.
-
-    What has such a name and no value is a damaged row.
-
-    >>> repeated_shapes(["--", "ax: nan", "--", "ax: nan", "ready"], ["ax", "ay", "az"])
-    {'--'}
-    """
-    words = {w for name in names for w in _WORD.findall(name.partition(" [")[0])}
-    seen = Counter(
-        line_shape(line) for line in lines if not words & {*_NAMED.findall(line)}
-    )
-    return {one for one, times in seen.items() if times > 1 and one}
-
-
-def repeated_labels(rows: Iterable[Sequence[Labelled]]) -> list[str]:
-    """Labels that repeat, in their order."""
-    seen = Counter(name for row in rows for name, _ in row)
-    usual = max((m for name, m in seen.items() if name not in CLOCKS), default=0)
-    return [name for name, many in seen.items() if many >= MIN_LABEL_SHARE * usual]

@@ -35,13 +35,7 @@ from fieldcal.importing.text.bare_fractions import BareFractions
 from fieldcal.importing.text.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.text.dataflash_text import DataflashText
 from fieldcal.importing.text.grouped_digits import GroupedDigits
-from fieldcal.importing.text.labels import (
-    CLOCKS,
-    TitledValues,
-    line_shape,
-    repeated_labels,
-    repeated_shapes,
-)
+from fieldcal.importing.text.labels import CLOCKS, TitledValues
 from fieldcal.importing.text.labview_text import LabviewText
 from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
@@ -49,6 +43,13 @@ from fieldcal.importing.text.nested_values import NestedValues
 from fieldcal.importing.text.paired_cells import PairedCells
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
+from fieldcal.importing.text.repeated_lines import (
+    count_sentences,
+    line_shape,
+    name_axes,
+    repeated_labels,
+    repeated_shapes,
+)
 from fieldcal.importing.text.scaled_counts import ScaledCounts
 from fieldcal.importing.text.sensor_codes import SensorCodes
 from fieldcal.importing.text.split_decimals import SplitDecimals
@@ -149,12 +150,14 @@ class LabelledValues(TextForm):
         titled = TitledValues()
         read = [titled.of(line) for line in lines]
         many = [row for row in read if row]
-        names = repeated_labels(many)
+        names = repeated_labels(many, CLOCKS)
         told = len(many) + titled.titles
-        if told <= MOSTLY * len(lines) or len(names) < len("xyz"):
+        others = [one for one, row in zip(lines, read, strict=True) if not row]
+        # of what a program prints besides, no sentence speaks against its labels
+        most = len(lines) - count_sentences(others) if name_axes(names) else len(lines)
+        if told <= MOSTLY * most or len(names) < len("xyz"):
             return None
         gathers = max(len(row) for row in many) < len(names)
-        others = [one for one, row in zip(lines, read, strict=True) if not row]
         return cls(names, separator or "\t", gathers, repeated_shapes(others, names))
 
     def reader(self) -> Reader:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import site_tables
+from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 
 if TYPE_CHECKING:
@@ -43,6 +44,11 @@ def import_imu(
         stream = next(s for s in recording.streams() if s.name == stream.name)
     if (scatter := recording.scatter()) is not None:
         return _import_means(args, recording, stream, folder, about, scatter)
+    if args.sigma:
+        raise InputError(
+            f"{recording.path}: --sigma says how well the rows of a table of means are"
+            " known, and this is none: leave --sigma out"
+        )
     with show_work(args, reading):
         imported = import_stream(recording, stream.name, folder, about, args.still)
     sys.stderr.write(
@@ -56,8 +62,26 @@ def import_imu(
         sys.stderr.write(f"{folder}: left out: {rows}\n")
     if not imported.rests:
         _tell_no_rests(args, about.get("units", {}))
+    _tell_of_rows(recording, folder, about, len(imported.rests))
     sys.stdout.write(f"{folder}\n")
     return imported
+
+
+def _tell_of_rows(
+    recording: Recording, folder: Path, about: Mapping[str, Any], rests: int
+) -> None:
+    """Say where each row may be taken for a position, if there are few `rests`."""
+    from fieldcal.importing.units.gravity_size import FEWEST_FACES
+
+    gravity = float(about["site"].get("gravity", G0))
+    few = rests < FEWEST_FACES and "units" not in about
+    sigma = recording.row_sigma(gravity) if few else None
+    if sigma is not None:
+        sys.stderr.write(
+            f"{folder}: |a| is gravity within {sigma:.2g} m/s^2 in all its rows: if it"
+            " was turned slowly, or read a few times at each position, import it again"
+            f" with --sigma {sigma:.2g}, which takes each row for a position\n"
+        )
 
 
 def _stated_tables(args: argparse.Namespace, recording: Recording) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,7 +61,7 @@ def import_imu(
         rows = _counted(imported.facts.left_out, "row", "s")
         sys.stderr.write(f"{folder}: left out: {rows}\n")
     if not imported.rests:
-        _tell_no_rests(args, about.get("units", {}))
+        _tell_no_rests(args, about.get("units", {}), imported.facts.measured)
     _tell_of_rows(recording, folder, about, len(imported.rests))
     sys.stdout.write(f"{folder}\n")
     return imported
@@ -108,7 +108,9 @@ def _tell_taken(
         sys.stderr.write(f"{folder}: {sentence}\n")
 
 
-def _tell_no_rests(args: argparse.Namespace, units: Mapping[str, str]) -> None:
+def _tell_no_rests(
+    args: argparse.Namespace, units: Mapping[str, str], measured: Collection[str]
+) -> None:
     """Say what to do where no still stretch was found; `units` have no known size."""
     if units:
         sys.stderr.write(
@@ -119,7 +121,9 @@ def _tell_no_rests(args: argparse.Namespace, units: Mapping[str, str]) -> None:
         )
     else:
         shorter = ", or try --still with a shorter time" if args.still > 1 else ""
-        sys.stderr.write(f"write the positions into session.toml{shorter}\n")
+        table = ", with speed_deg_s where a rate table turned it"
+        alone = table if {*measured} == {"g"} else ""
+        sys.stderr.write(f"write the positions into session.toml{alone}{shorter}\n")
 
 
 def _import_means(

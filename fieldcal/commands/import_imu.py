@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fieldcal.core.samples import Array
     from fieldcal.importing.recording import ImuStream, MeanScatter, Recording
     from fieldcal.importing.session.ingest import ImportedSession
+    from fieldcal.windows.joined_rests import RestPeriod
 
 
 def import_imu(
@@ -53,8 +54,7 @@ def import_imu(
         imported = import_stream(recording, stream.name, folder, about, args.still)
     sys.stderr.write(
         f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"
-        f" {_counted(len(imported.rests), 'still stretch', 'es')}"
-        f" of {args.still:g} s or more\n"
+        f" {_counted_rests(imported.rests, args.still)}\n"
     )
     _tell_taken(folder, guessed, imported)
     if imported.facts.left_out:
@@ -65,6 +65,18 @@ def import_imu(
     _tell_of_rows(recording, folder, about, len(imported.rests))
     sys.stdout.write(f"{folder}\n")
     return imported
+
+
+def _counted_rests(rests: Sequence[RestPeriod], still: float) -> str:
+    """How many rests there are, of so many s or more where they are as long.
+
+    Rests of a log that holds nothing else are as long as they are.
+    """
+    said = _counted(len(rests), "still stretch", "es")
+    # the last sample of a rest begins no interval
+    if rests and min(rest.end - rest.start for rest in rests) < 0.9 * still:
+        return said
+    return f"{said} of {still:g} s or more"
 
 
 def _tell_of_rows(

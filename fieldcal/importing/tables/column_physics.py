@@ -255,8 +255,10 @@ def _scattered(values: Array, size: float) -> bool:
     """Whether values (n, 3) are noise: their changes from row to row are large."""
     if are_means(values):
         return False
-    differ = np.abs(np.diff(values, axis=0))
-    return bool(np.nanmedian(differ, axis=0).max() > NOISY * size)
+    # between them may stand rows of another sensor
+    whole = values[np.isfinite(values).all(axis=1)]
+    differ = np.abs(np.diff(whole, axis=0))
+    return len(whole) > 1 and bool(np.median(differ, axis=0).max() > NOISY * size)
 
 
 def is_direction(values: Array) -> bool:

@@ -77,9 +77,6 @@ _TICKS = re.compile(
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 """Colours of a terminal."""
 
-_TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
-"""A line that holds nothing but a name."""
-
 _PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({NUMBER})(?:\|\w*)?")
 """A name, ms since 1970 and a value, as Teleplot reads them."""
 
@@ -94,8 +91,8 @@ ARRIVAL = re.compile(
     r"\d{4}-\d\d-\d\d[-_T ]\d\d-\d\d-\d\d(?:\.\d+)?)\]?\s*(?:->|>|:+|,|\s)\s*"
 )
 
-_NAME = re.compile(r"\W*[A-Za-z][\w-]*:(?!\S)\W*")
-"""What stands alone before the first label: a chip or a program."""
+_NAME = re.compile(r"\W*([A-Za-z][\w-]*(?: #?\d+)?):(?!\S)\W*")
+"""What stands alone before the first label: a chip, a program, a sensor or a device."""
 
 _LETTER = re.compile("[A-Za-z_:]")
 """What a line with labels has, and one of numbers alone has not."""
@@ -111,7 +108,7 @@ NamedUnit = tuple[str, str]
 
 
 def labelled_values(line: str) -> list[Labelled]:
-    """Labels and values of a line; empty if it holds something else.
+    """Labels and values of a line, whatever it is called; empty if it has none.
 
     >>> labelled_values("Acceleration X: -0.1, Y: 0.2 m/s^2")
     [('Acceleration X [m/s^2]', '-0.1'), ('Acceleration Y [m/s^2]', '0.2')]
@@ -120,10 +117,19 @@ def labelled_values(line: str) -> list[Labelled]:
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
+    return named_values(line)[1]
+
+
+def named_values(line: str) -> tuple[str, list[Labelled]]:
+    """What stands alone before the labels of a line, and what they label.
+
+    >>> named_values("A: t: 1 x: 2 y: 3")
+    ('A', [('t', '1'), ('x', '2'), ('y', '3')])
+    """
     if len(line) > LONGEST or not _LETTER.search(line):
-        return []
+        return "", []
     if plotted := _PLOTTED.fullmatch(line.strip()):
-        return [(TICKS, plotted[2]), (plotted[1].strip(), plotted[3])]
+        return "", [(TICKS, plotted[2]), (plotted[1].strip(), plotted[3])]
     line = _COLOURS.sub("", line)
     prefix = log_prefix(line)
     line = line[prefix.length :] if prefix else line
@@ -135,23 +141,23 @@ def labelled_values(line: str) -> list[Labelled]:
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
     rest = LEVEL.sub("", rest, 1) if LEVEL.match(rest) else rest
-    split = _split_labels(rest)
+    name, split = _split_labels(rest)
     parts, values = [], []
     for label, text in split:
         said = _VALUES.fullmatch(text)
         behind = re.findall(NUMBER, said[1]) if said else []
         if said is None or len(behind) not in (1, len(AXES)):
-            return []
+            return "", []
         values += behind
         parts.append((label, len(behind), said[2].strip(" \t,;|")))
     names = _names(tuple(parts))
     if names is None:
-        return []
+        return "", []
     read = [*zip(names, values, strict=True)]
     first = [(TIME, arrival[1].strip())] if read and arrival else []
     first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
     first += [(prefix.name, prefix.value)] if read and prefix else []
-    return first + read
+    return name, first + read
 
 
 @lru_cache(SHAPES)
@@ -170,7 +176,7 @@ def _names(parts: tuple[tuple[str, int, str], ...]) -> tuple[str, ...] | None:
         label, moved = _split_unit(label, read)
         if moved and read:
             read = _with_unit(read, moved)
-        label, unit = _complete_label(label, read)
+        label, unit = complete_label(label, read)
         names = [f"{label} {a}" for a in AXES] if many > 1 else [label]
         read += [(name, unit) for name in names]
         if len(behind) > MAX_UNIT_LETTERS:
@@ -193,55 +199,65 @@ def _of_temperature(line: str) -> str:
     return f"{alone[1]}: {alone[2]}"
 
 
-class TitledValues:
-    """Labels and values of lines in which a title names the sensor of the next axes.
+def _split_labels(line: str) -> tuple[str, list[tuple[str, str]]]:
+    """What a line is called, and its labels with what stands behind each.
 
-    Attributes
-    ----------
-    titles : lines of that kind so far
-
-    >>> titled = TitledValues()
-    >>> [titled.of(line) for line in ("--- Gyro (deg/s) ---", "X: 1 Y: 2")]
-    [[], [('Gyro X [deg/s]', '1'), ('Gyro Y [deg/s]', '2')]]
-    """
-
-    def __init__(self) -> None:
-        self._title = self._unit = ""
-        self.titles = 0
-
-    def of(self, line: str) -> list[Labelled]:
-        """Labels and values of the next line."""
-        read = labelled_values(line)
-        title = None if read else _TITLE.fullmatch(line)
-        if title is not None:
-            bare, unit = _complete_label(" ".join(title[1].split()), [])
-            said = heading_meaning(f"{bare} x")
-            if said is not None and said.kind:
-                self._title, self._unit = bare, f" [{unit}]" if unit else ""
-                self.titles += 1
-        if not self._title:
-            return read
-        return [(f"{self._title} {n}{self._unit}" if n.lower() in AXES else n, v)
-                for n, v in read]  # fmt: skip
-
-
-def _split_labels(line: str) -> list[tuple[str, str]]:
-    """Labels, and what stands behind each; none if anything stands before the first.
+    There are none if anything else stands before the first.
 
     >>> _split_labels("Accel: x= 1 | y= 2 Gyro: x= 3")
-    [('Accel x', '1 | '), ('y', '2'), ('Gyro x', '3')]
+    ('', [('Accel x', '1 | '), ('y', '2'), ('Gyro x', '3')])
     """
     parts = _LABEL.split(line)
     if len(parts) < len(AXES):
-        return []
+        return "", []
     labels, texts = [_bare_label(one) for one in parts[1::2]], parts[::2]
     for i, label in enumerate(labels):
         sensor = _SENSOR.fullmatch(texts[i])
         if sensor and label.lower() in AXES:
             texts[i], labels[i] = sensor[1], f"{sensor[2]} {label}"
+    if len({*labels}) < len(labels):
+        labels = [*_told_apart(tuple(labels))]
     if any(map(str.isalnum, _NAME.sub("", texts[0], 1))):
-        return []
-    return [*zip(labels, texts[1:], strict=True)]
+        return "", []
+    alone = _NAME.search(texts[0])
+    name, labels[0] = (alone[1], labels[0]) if alone else _of_line(tuple(labels))
+    return name, [*zip(labels, texts[1:], strict=True)]
+
+
+@lru_cache(SHAPES)
+def _told_apart(labels: tuple[str, ...]) -> tuple[str, ...]:
+    """Labels of which some are the same, with the words before the last such one.
+
+    >>> _told_apart(("left ax", "ay", "right ax", "ay"))
+    ('left ax', 'left ay', 'right ax', 'right ay')
+    """
+    found, before = [], ""
+    for label in labels:
+        words, _, axis = label.rpartition(" ")
+        said = heading_meaning(axis)
+        mine = said is not None and bool(said.axis)
+        before = words if mine and words else before
+        found.append(f"{before} {axis}" if mine and before else label)
+    return tuple(found)
+
+
+@lru_cache(SHAPES)
+def _of_line(labels: tuple[str, ...]) -> tuple[str, str]:
+    """What a line is called before its first label, and that label.
+
+    >>> _of_line(("left ax", "ay", "az")), _of_line(("Accel x", "y", "z"))
+    (('left', 'ax'), ('', 'Accel x'))
+    """
+    before, _, label = labels[0].rpartition(" ")
+    whole, said = heading_meaning(labels[0]), heading_meaning(label)
+    if (
+        (said is None or not said.axis)
+        # of other than measured accelerations it says what they are
+        or (whole is None or whole.weak or whole.kind != said.kind)
+        or any(" " in one for one in labels[1:])
+    ):
+        return "", labels[0]
+    return before.strip(" ->[](){}#:|"), label
 
 
 def _bare_label(label: str) -> str:
@@ -267,13 +283,13 @@ def _split_unit(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:
         return label, ""
     names = [name for name, _ in read]
     own = rest.lower() in AXES and (
-        _complete_label(rest, read)[0] in names
+        complete_label(rest, read)[0] in names
         or (bool(names) and names[-1].rpartition(" ")[0] == first)
     )
     return (label, "") if own else (rest, first)
 
 
-def _complete_label(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:
+def complete_label(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:
     """A label and its unit; of an axis alone with what the one before it says."""
     before, unit = read[-1] if read else ("", "")
     bare, _, axis = before.rpartition(" ")

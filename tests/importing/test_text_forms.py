@@ -155,6 +155,10 @@ def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
         "Force in m/s^2\tX: {}\tY: {}\tZ: {}\tTurn in rad/s\tX: {}\tY: {}\tZ: {}",
         "Ax={} m/s²\tAy={} m/s²\tAz={} m/s²\tGx={} rad/s\tGy={} rad/s\tGz={} rad/s",
         "ax {} ay {} az {} gx {} gy {} gz {}",
+        "info: acc: x {} y {} z {} (m/s²) gyro: x {} y {} z {} (rad/s) temp: 25.1°C",
+        "MPU\naccel x,y,z: {}, {}, {}\ntemperature: 25.1 °C\ngyro x,y,z : {}, {}, {}, ",
+        "chip: accel: x: {} y: {} z: {} [m/s^2] gyro: x: {} y: {} z: {} [rad/s]",
+        "acc_xyz: {} {} {} gyr XYZ: {} {} {}",
         "A X: {} A Y: {} A Z: {} G X: {} G Y: {} G Z: {}",
         "RAW. Acc [ {}, {}, {} ], Gyr [ {}, {}, {} ], Tmp [ 25.1 ]",
         "--- Accelerometer (m/s^2) ---\nX: {} Y: {} Z: {}\n"

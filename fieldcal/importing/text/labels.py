@@ -19,6 +19,7 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 
+from fieldcal.importing.text.label_spellings import MAX_UNIT_LETTERS, plain_labels
 from fieldcal.importing.text.log_prefixes import STAMP, TICKS, TIME, log_prefix
 from fieldcal.importing.text.repeated_lines import NUMBER
 from fieldcal.importing.words.heading_units import parse_unit
@@ -28,37 +29,13 @@ from fieldcal.importing.words.sensor_words import AXES
 CLOCKS = frozenset((TIME, TICKS, STAMP))
 """Names that each line of a row may have."""
 
-MAX_UNIT_LETTERS = 12
-"""Letters of a unit; what is longer is a sentence."""
-
 LONGEST = 2000
 """Characters of a line of values for people; a dump of bytes in one line has more."""
 
 SHAPES = 256
 """Kinds of lines whose names are remembered: a program prints a few."""
 
-_LIST = re.compile(rf"(?<=[:=])\s*[\[({{<]\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*[\])}}>]")
-_LISTED = re.compile(
-    rf"(\([^()]*\)|[A-Za-z])\s*\[\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*\]"
-)
-"""Values in a list right behind a label or its unit in brackets."""
-
-_DICT = re.compile(
-    r"[{(]\s*"
-    + r"\s*,\s*".join(rf"['\"]?{a}['\"]?\s*[:=]\s*({NUMBER})" for a in AXES)
-    + r"\s*[})]",
-    re.IGNORECASE,
-)
-"""Three axes as Python prints them, or JavaScript."""
-
-_PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{NUMBER}[\s,;|]*){{3,}}")
-_PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={NUMBER})")
-"""Labels with a space before their value, where a line holds nothing else."""
-
-_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({NUMBER}\D*)")
-"""A label with its value alone in a line, as programs print a temperature."""
-
-_SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
+_SENSOR = re.compile(r"(.*?:?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
 """What stands before an axis: something else, and the label of all its axes."""
 
 _IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| ?[(\[]([^()\[\]]+)[)\]])( [xyzXYZ])?")
@@ -83,6 +60,7 @@ _PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({NUMBER})(?:\|\w*)?")
 LEVEL = re.compile(
     r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*"
     r"|\s*[\[(](?i:debug|info|warning|warn|error|trace)[\])][\s:,-]*"
+    r"|\s*(?:debug|info|warning|warn|error|trace)(?:\([\w.]*\))?:\s+(?=[A-Za-z])"
 )
 """What programs write behind the time of a line."""
 
@@ -133,10 +111,7 @@ def named_values(line: str) -> tuple[str, list[Labelled]]:
     line = _COLOURS.sub("", line)
     prefix = log_prefix(line)
     line = line[prefix.length :] if prefix else line
-    line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
-    line = _LISTED.sub(r"\1: \2", line)
-    line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
-    line = _of_temperature(line)
+    line = plain_labels(line)
     arrival, ticks = ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
@@ -184,19 +159,6 @@ def _names(parts: tuple[tuple[str, int, str], ...]) -> tuple[str, ...] | None:
         if parse_unit(behind):
             read = _with_unit(read, behind)
     return tuple(f"{name} [{unit}]" if unit else name for name, unit in read)
-
-
-def _of_temperature(line: str) -> str:
-    """A line that holds a temperature alone, with what stands behind a label.
-
-    >>> _of_temperature("  Temperature 23.40 deg C"), _of_temperature("Sample 12")
-    ('Temperature: 23.40 deg C', 'Sample 12')
-    """
-    alone = _ALONE.fullmatch(line)
-    said = heading_meaning(alone[1]) if alone else None
-    if alone is None or said is None or said.kind != "temperature":
-        return line
-    return f"{alone[1]}: {alone[2]}"
 
 
 def _split_labels(line: str) -> tuple[str, list[tuple[str, str]]]:

@@ -159,6 +159,10 @@ def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
         "MPU\naccel x,y,z: {}, {}, {}\ntemperature: 25.1 °C\ngyro x,y,z : {}, {}, {}, ",
         "chip: accel: x: {} y: {} z: {} [m/s^2] gyro: x: {} y: {} z: {} [rad/s]",
         "acc_xyz: {} {} {} gyr XYZ: {} {} {}",
+        "ax, ay, az: {}, {}, {} m/s^2\ngx, gy, gz: {}, {}, {} rad/s",
+        "ax,ay,az,gx,gy,gz: {},{},{},{},{},{}",
+        "(ax, ay, az) = ({}, {}, {}), (gx, gy, gz) = ({}, {}, {})",
+        "Raw acc [x/y/z]: {} {} {} Yaw, Pitch: 1, 2 Gyro (x, y, z): {}, {}, {}",
         "A X: {} A Y: {} A Z: {} G X: {} G Y: {} G Z: {}",
         "RAW. Acc [ {}, {}, {} ], Gyr [ {}, {}, {} ], Tmp [ 25.1 ]",
         "--- Accelerometer (m/s^2) ---\nX: {} Y: {} Z: {}\n"

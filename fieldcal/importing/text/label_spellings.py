@@ -1,7 +1,9 @@
 """Labels and values as programs spell them, each as a label, a colon and its value.
 
 x 0.1 y 0.2 z 9.8                  x: 0.1 y: 0.2 z: 9.8
-accel x,y,z: 0.1, 0.2, 9.8         accel: 0.1, 0.2, 9.8
+accel x,y,z: 0.1, 0.2, 9.8         accel x: 0.1 y: 0.2 z: 9.8
+(ax, ay, az) = (0.1, 0.2, 9.8)     ax: 0.1 ay: 0.2 az: 9.8
+acc_xyz: 0.1, 0.2, 9.8             acc: 0.1, 0.2, 9.8
 ax: 0.1 (m/s²) ay: 0.2 (m/s²)      ax: 0.1 m/s², ay: 0.2 m/s²,
 accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}       Acc (mg) [ 10.1, -2.3, 999.1 ]
 """
@@ -43,6 +45,12 @@ _BEHIND = re.compile(
 )
 """A value with its unit in brackets behind it."""
 
+_NAMES = re.compile(
+    r"[(\[]?\b([A-Za-z_]\w*(?:\s*[,/]\s*[A-Za-z_]\w*)+)\s*[)\]]?\s*[:=]\s*"
+    rf"[(\[]?\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*[)\]]?"
+)
+"""Labels in a list, and a list of their values."""
+
 _OVER_AXES = re.compile(
     r"([A-Za-z_)])[\s_(\[]+x\s*[,/]?\s*y\s*[,/]?\s*z\b\s*[)\]]?\s*[:=]", re.IGNORECASE
 )
@@ -61,9 +69,10 @@ def plain_labels(line: str) -> str:
 
     >>> plain_labels("accel x 0.1 y 0.2 z 9.8 (m/s^2)")
     'accel x: 0.1 y: 0.2 z: 9.8 m/s^2, '
-    >>> plain_labels("gyro x,y,z : 1, 2, 3"), plain_labels("Acc (mg) [ 1, 2, 3 ]")
-    ('gyro: 1, 2, 3', 'Acc (mg): 1, 2, 3')
+    >>> plain_labels("gx, gy, gz : 1, 2, 3 dps"), plain_labels("Acc (mg) [ 1, 2, 3 ]")
+    ('gx: 1 gy: 2 gz: 3 dps', 'Acc (mg): 1, 2, 3')
     """
+    line = _NAMES.sub(_pairs, line)
     line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
     line = _SPACED.sub(r"\1: \2 \3: \4 \5: \6", line)
     line = _OVER_AXES.sub(r"\1:", line)
@@ -71,6 +80,14 @@ def plain_labels(line: str) -> str:
     line = _LISTED.sub(r"\1: \2", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
     return _of_temperature(line)
+
+
+def _pairs(said: re.Match[str]) -> str:
+    """Each label of a list with its value, if there are as many."""
+    names, values = re.split(r"\s*[,/]\s*", said[1]), re.findall(NUMBER, said[2])
+    if len(names) != len(values):
+        return said[0]
+    return " ".join(map("{}: {}".format, names, values)) + " "
 
 
 def _bare_unit(said: re.Match[str]) -> str:

@@ -99,6 +99,11 @@ class Calibration:
         return np.sqrt(np.diag(self.covariance))
 
     @property
+    def is_checked(self) -> bool:
+        """Whether more was measured than was estimated, so that data could disagree."""
+        return self.dof > 0 or not np.isfinite(self.chi2)
+
+    @property
     def groups(self) -> tuple[str, ...]:
         """The ids present, in order."""
         return tuple(dict.fromkeys(group_of(n) for n in self.names))

@@ -19,6 +19,11 @@ TITLES = {
 }
 """Name of each group of parameters."""
 
+UNCHECKED = (
+    "not contradicted, and not confirmed: nothing is left to check these numbers"
+)
+"""Verdict about an estimate with as many parameters as means."""
+
 
 def format_with_sigma(value: float, sigma: float) -> tuple[str, str]:
     """Value and sigma, with two significant digits of sigma.

@@ -75,6 +75,7 @@ def read_options(args: argparse.Namespace, i: int) -> ReadOptions:
         args.temp_zero,
         reversed=frozenset(name.removeprefix("-") for name in other_way),
         acc_zero=args.acc_zero,
+        means=bool(args.sigma),
     )
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import site_tables
+from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 
 if TYPE_CHECKING:
     from fieldcal.core.samples import Array
     from fieldcal.importing.recording import ImuStream, MeanScatter, Recording
     from fieldcal.importing.session.ingest import ImportedSession
+    from fieldcal.windows.joined_rests import RestPeriod
 
 
 def import_imu(
@@ -43,21 +45,55 @@ def import_imu(
         stream = next(s for s in recording.streams() if s.name == stream.name)
     if (scatter := recording.scatter()) is not None:
         return _import_means(args, recording, stream, folder, about, scatter)
+    if args.sigma:
+        raise InputError(
+            f"{recording.path}: --sigma says how well the rows of a table of means are"
+            " known, and this is none: leave --sigma out"
+        )
     with show_work(args, reading):
         imported = import_stream(recording, stream.name, folder, about, args.still)
     sys.stderr.write(
         f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"
-        f" {_counted(len(imported.rests), 'still stretch', 'es')}"
-        f" of {args.still:g} s or more\n"
+        f" {_counted_rests(imported.rests, args.still)}\n"
     )
     _tell_taken(folder, guessed, imported)
     if imported.facts.left_out:
         rows = _counted(imported.facts.left_out, "row", "s")
         sys.stderr.write(f"{folder}: left out: {rows}\n")
     if not imported.rests:
-        _tell_no_rests(args, about.get("units", {}))
+        _tell_no_rests(args, about.get("units", {}), imported.facts.measured)
+    _tell_of_rows(recording, folder, about, len(imported.rests))
     sys.stdout.write(f"{folder}\n")
     return imported
+
+
+def _counted_rests(rests: Sequence[RestPeriod], still: float) -> str:
+    """How many rests there are, of so many s or more where they are as long.
+
+    Rests of a log that holds nothing else are as long as they are.
+    """
+    said = _counted(len(rests), "still stretch", "es")
+    # the last sample of a rest begins no interval
+    if rests and min(rest.end - rest.start for rest in rests) < 0.9 * still:
+        return said
+    return f"{said} of {still:g} s or more"
+
+
+def _tell_of_rows(
+    recording: Recording, folder: Path, about: Mapping[str, Any], rests: int
+) -> None:
+    """Say where each row may be taken for a position, if there are few `rests`."""
+    from fieldcal.importing.units.gravity_size import FEWEST_FACES
+
+    gravity = float(about["site"].get("gravity", G0))
+    few = rests < FEWEST_FACES and "units" not in about
+    sigma = recording.row_sigma(gravity) if few else None
+    if sigma is not None:
+        sys.stderr.write(
+            f"{folder}: |a| is gravity within {sigma:.2g} m/s^2 in all its rows: if it"
+            " was turned slowly, or read a few times at each position, import it again"
+            f" with --sigma {sigma:.2g}, which takes each row for a position\n"
+        )
 
 
 def _stated_tables(args: argparse.Namespace, recording: Recording) -> dict[str, Any]:
@@ -84,7 +120,9 @@ def _tell_taken(
         sys.stderr.write(f"{folder}: {sentence}\n")
 
 
-def _tell_no_rests(args: argparse.Namespace, units: Mapping[str, str]) -> None:
+def _tell_no_rests(
+    args: argparse.Namespace, units: Mapping[str, str], measured: Collection[str]
+) -> None:
     """Say what to do where no still stretch was found; `units` have no known size."""
     if units:
         sys.stderr.write(
@@ -95,7 +133,9 @@ def _tell_no_rests(args: argparse.Namespace, units: Mapping[str, str]) -> None:
         )
     else:
         shorter = ", or try --still with a shorter time" if args.still > 1 else ""
-        sys.stderr.write(f"write the positions into session.toml{shorter}\n")
+        table = ", with speed_deg_s where a rate table turned it"
+        alone = table if {*measured} == {"g"} else ""
+        sys.stderr.write(f"write the positions into session.toml{alone}{shorter}\n")
 
 
 def _import_means(

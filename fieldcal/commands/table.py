@@ -9,17 +9,15 @@ from typing import IO, TYPE_CHECKING, Any
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.names import group_of
-from fieldcal.calibration.wording import format_with_sigma, parameter_title
+from fieldcal.calibration.wording import (
+    UNCHECKED,
+    format_with_sigma,
+    parameter_title,
+)
 from fieldcal.commands.install_values import install_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-
-UNCHECKED = (
-    "not contradicted, and not confirmed: nothing is left to check these numbers"
-)
-"""Verdict about an estimate with as many parameters as means."""
 
 
 def show_calibration(
@@ -77,8 +75,8 @@ def _print_fit_and_verdict(console: Console, calibration: Calibration) -> None:
     if not calibration.good:
         print_sentence(console, "", "verdict: BAD, do not use these numbers")
     elif "decision" not in calibration.info:  # which says more, below
-        checked = calibration.dof > 0 or not math.isfinite(calibration.chi2)
-        print_sentence(console, "", f"verdict: {'good' if checked else UNCHECKED}")
+        verdict = "good" if calibration.is_checked else UNCHECKED
+        print_sentence(console, "", f"verdict: {verdict}")
 
 
 def print_sentence(console: Console, mark: str, text: str) -> None:

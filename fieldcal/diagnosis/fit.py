@@ -71,7 +71,8 @@ def times_since_turn(source: RowSource, rows: Rows) -> Array:
     Each is given with and without a turn before the first window.
     """
     x, arrived = rows.x, source.rest_began
-    if not source.about.positions:
+    if not source.about.positions or source.about.means_only:
+        # of means nobody knows how long after the turn their samples were taken
         return np.full((1, len(x)), np.inf)
     starts = window_starts(source)
     lead = (starts - arrived)[np.isfinite(arrived)]

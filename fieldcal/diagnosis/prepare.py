@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.calibration.gauge import SI
+from fieldcal.calibration.plausible import UNREAL
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Block
 from fieldcal.diagnosis.signal.chain import (
@@ -84,6 +86,7 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     checked, source = _checked_source(checked, about)
     rows = rows_of_recording(source)
     _refuse_turning(rows, about)
+    _refuse_spinning(rows, about)
     lines = find_lines(source, rows)
     tones = tuple(tone for tone, _ in lines)
     left = tuple(remains for _, remains in lines)
@@ -229,6 +232,25 @@ def _refuse_turning(rows: Rows, about: Description) -> None:
             "the device is turned in this recording, and session.toml has no"
             " [[position]]: write down when it was held, or let fieldcal import find"
             " the still stretches"
+        )
+
+
+def _refuse_spinning(rows: Rows, about: Description) -> None:
+    """Refuse a recording without positions with rates that no gyroscope at rest has.
+
+    A table about the vertical turns the device and no accelerometer shows it.
+    """
+    unsized = about.gauge.units[1] != SI[1] and about.gauge.size[1] == 1
+    if about.positions or unsized:
+        return
+    usual, scale = about.nominal["gyr_bias"], about.nominal["gyr_scale"]
+    rates = np.where(rows.used[:, GYR], np.abs((rows.y[:, GYR] - usual) / scale), 0.0)
+    if (fastest := float(rates.max(initial=0.0))) > UNREAL["gyr_bias"]:
+        raise InputError(
+            f"the gyroscopes read {np.rad2deg(fastest):.3g} deg/s for a second, which"
+            " no bias is, and session.toml has no [[position]]: write down when the"
+            " device rested, with speed_deg_s where a rate table turned it; or import"
+            " it again with --gyr-unit, if their unit is another"
         )
 
 

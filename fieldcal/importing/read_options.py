@@ -78,6 +78,7 @@ class ReadOptions:
     usual : unit of rates that such names of columns have; "" where they tell none
     free : whether the names of accelerations are those of ones without gravity
     no_gain : whether names say accelerations, and so no gains of velocity
+    means : whether rows are means, of which the user says how well they are known
 
     """
 
@@ -104,6 +105,7 @@ class ReadOptions:
     free: bool = False
     no_gain: bool = False
     acc_zero: tuple[float, ...] = ()
+    means: bool = False
 
     @property
     def acc_scale(self) -> float:

@@ -151,6 +151,13 @@ class Recording(ABC):
         """
         return None
 
+    def row_sigma(self, gravity: float) -> float | None:
+        """Standard deviation of its rows, m/s^2, if each may be taken for a position.
+
+        None where gravity, m/s^2, is not all that its accelerometers feel.
+        """
+        return None
+
     def rescaled(self, acc: float, gyr: float) -> str:
         """Options under which outputs read so many times less; "" if there are none."""
         return ""

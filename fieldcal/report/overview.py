@@ -10,7 +10,12 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.names import ParameterName
-from fieldcal.calibration.wording import format_unit, format_with_sigma, parameter_title
+from fieldcal.calibration.wording import (
+    UNCHECKED,
+    format_unit,
+    format_with_sigma,
+    parameter_title,
+)
 from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array
 from fieldcal.core.samples import Block as SampleBlock
@@ -77,6 +82,8 @@ def _verdict(
         return "no-go", "bad", f"{do} {reasons or 'A limit is not kept'}."
     if not found.good:
         return "bad", "bad", "Do not use these numbers."
+    if not found.is_checked and decision.get("go") is not True:
+        return "not checked", "warn", f"{UNCHECKED[:1].upper()}{UNCHECKED[1:]}."
     says = "Apply it: the numbers hold within their ±."
     if known:
         says = _advice_on_calibration_in_use(found, nominal)

@@ -31,6 +31,9 @@ JUMP_OVER_NOISE = 8.0
 FEWEST_ROWS, FEWEST_POSITIONS = 20, 3
 """Fewest rows of a position, and fewest positions, of such a recording."""
 
+FEWEST_FACES = 6
+"""Positions from which on one of them may not have been at rest."""
+
 LARGEST_SCATTER_RATIO = 5.0
 """Largest ratio of the scatter of rows in one position to that in another."""
 
@@ -142,7 +145,10 @@ class JumpFinder:
         time = jumps.time
         rows = np.diff(np.concatenate([[0], jumps.row, [self._rows]]))
         long = rows >= FEWEST_ROWS
-        if long.sum() < FEWEST_POSITIONS or rests[long].mean() < LEAST_SHARE:
+        held, moved = rests[long].sum(), (~rests[long]).sum()
+        # of all faces, one may have been nudged while it was held
+        most = max((1 - LEAST_SHARE) * long.sum(), held >= FEWEST_FACES - 1)
+        if held < FEWEST_POSITIONS or moved > most:
             return []
         differ = np.diff(np.concatenate([[0.0], jumps.steps, [self._steps]])) / rows
         quiet = max(float(differ[long].min()), self._least_jump)

@@ -7,6 +7,7 @@ sample of a turn.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -54,6 +55,26 @@ def still_stretches(
     cells.add(block)
     table = cells.table
     return still_stretches_of_file(cell_rows(table), table.origin, between, min_seconds)
+
+
+def calm_parts(
+    between: SamplesBetween, span: tuple[float, float], min_seconds: float
+) -> list[tuple[float, float]]:
+    """Parts of a position that pass the test of a window; all of it if none does.
+
+    A device that is nudged while it is held has two attitudes in one position.
+
+    Parameters
+    ----------
+    between : gives the samples of a stretch of the recording
+    span : first and last instant of the position, s
+    min_seconds : as in `still_stretches`
+
+    """
+    start, end = span
+    after = float(np.nextafter(end, np.inf))
+    parts = _passing_parts(between, start, after, max(1.0, min_seconds))
+    return [span] if not parts or parts == [(start, after)] else parts
 
 
 def cell_rows(cells: CellTable) -> Array:
@@ -191,6 +212,29 @@ def _passes_clearly(cells: CellTable, shortest: float) -> tuple[float, float] | 
     return first, float(np.nextafter(last, np.inf))
 
 
+def _level_change(cells: CellTable, channel: int) -> float | None:
+    """Instant, s, at which a channel that seems to drift changed its level; or None.
+
+    A nudge amid a stretch looks like a drift over all of it. It is one if two levels
+    leave less of the cell means than a line does.
+    """
+    y = cells.steady_means[: cells.complete_count, channel]
+    t = np.arange(len(y))
+    known = np.isfinite(y)
+    y, t = y[known], t[known]
+    if len(y) < 2 * FEWEST_CELLS:
+        return None
+    left = y - np.polyval(np.polyfit(t, y, 1), t)
+    many = np.arange(1, len(y))
+    first, all_of_it = np.cumsum(y)[:-1], y.sum()
+    # what two levels explain of the squares
+    levels = first**2 / many + (all_of_it - first) ** 2 / (len(y) - many)
+    at = int(np.argmax(levels))
+    if (y @ y) - levels[at] >= left @ left:
+        return None
+    return float(cells.times[t[at + 1]])
+
+
 def _passing_parts(
     between: SamplesBetween, start: float, end: float, shortest: float
 ) -> list[tuple[float, float]]:
@@ -207,6 +251,12 @@ def _passing_parts(
     if worst.ratio <= 1:
         return [(first, float(np.nextafter(last, np.inf)))]
     over = worst.at + worst.seconds
+    if worst.kind == "drift":
+        at = _level_change(sums.table, worst.channel)
+        if at is None:
+            return []
+        # the cell before or behind may hold samples of both levels
+        worst, over = replace(worst, at=at - CELL), at + CELL
     if worst.kind == "step" and last - worst.at > TESTED_S:
         over = worst.at + CELL  # its seconds are those of the means that show it
     # at an end of the stretch the last or the first sample is removed

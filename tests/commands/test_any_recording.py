@@ -392,6 +392,8 @@ def moved(by: float) -> list[Table]:
         (None, [*POSITIONS, {"start_s": 30.0, "end_s": 40.0}], {},
          "the device cannot be in both"),
         (None, [], {}, "the device is turned in this recording"),
+        (lambda b: replace(b, acc=unknown(b.acc), gyr=b.gyr + [0, 0, 3.5]), [], {},
+         "deg/s for a second, which no bias is, and session.toml has no [[position]]"),
         (lambda b: b[:15], [], {}, "no [[position]], and 15 samples are less than"),
         (lambda b: replace(b, gyr=unknown(b.gyr)), [], {}, "let fieldcal import find"),
         (lambda b: replace(b, acc=0 * b.acc, gyr=0 * b.gyr), POSITIONS, {},

@@ -44,6 +44,20 @@ def test_a_short_log_that_may_be_slow_is_asked_about(tmp_path: Path) -> None:
         read_files([write(tmp_path, rows, heading=NAMES)])
 
 
+@pytest.mark.parametrize("step", [1.3e-5, 4e-5])
+def test_rows_faster_than_an_imu_are_asked_about(tmp_path: Path, step: float) -> None:
+    # a loop that does not wait for the sensor, or times in hours
+    rows = turned(4, 50.0, 0.5)
+    rows[:, 0] = 0.57 + step * np.arange(len(rows))
+    path = write(tmp_path, rows, heading=NAMES.replace("time", "t"))
+    asked = rf"Hz in s, more than .*--time-unit h \({1 / 3600 / step:.3g} Hz\)"
+    with pytest.raises(InputError, match=asked):
+        read_files([path])
+    stated = write(tmp_path, rows, "stated.csv", NAMES.replace("time", "t (s)"))
+    block, _ = read_files([stated])
+    np.testing.assert_allclose(np.diff(block.t), step, rtol=1e-3)
+
+
 @pytest.mark.parametrize("size", [1e6, 1e9])
 @pytest.mark.parametrize("rows", [7, 3000])
 def test_a_day_tells_the_unit_of_a_thousand_rows_a_second(

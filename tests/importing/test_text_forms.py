@@ -155,6 +155,14 @@ def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
         "Force in m/s^2\tX: {}\tY: {}\tZ: {}\tTurn in rad/s\tX: {}\tY: {}\tZ: {}",
         "Ax={} m/s²\tAy={} m/s²\tAz={} m/s²\tGx={} rad/s\tGy={} rad/s\tGz={} rad/s",
         "ax {} ay {} az {} gx {} gy {} gz {}",
+        "info: acc: x {} y {} z {} (m/s²) gyro: x {} y {} z {} (rad/s) temp: 25.1°C",
+        "MPU\naccel x,y,z: {}, {}, {}\ntemperature: 25.1 °C\ngyro x,y,z : {}, {}, {}, ",
+        "chip: accel: x: {} y: {} z: {} [m/s^2] gyro: x: {} y: {} z: {} [rad/s]",
+        "acc_xyz: {} {} {} gyr XYZ: {} {} {}",
+        "ax, ay, az: {}, {}, {} m/s^2\ngx, gy, gz: {}, {}, {} rad/s",
+        "ax,ay,az,gx,gy,gz: {},{},{},{},{},{}",
+        "(ax, ay, az) = ({}, {}, {}), (gx, gy, gz) = ({}, {}, {})",
+        "Raw acc [x/y/z]: {} {} {} Yaw, Pitch: 1, 2 Gyro (x, y, z): {}, {}, {}",
         "A X: {} A Y: {} A Z: {} G X: {} G Y: {} G Z: {}",
         "RAW. Acc [ {}, {}, {} ], Gyr [ {}, {}, {} ], Tmp [ 25.1 ]",
         "--- Accelerometer (m/s^2) ---\nX: {} Y: {} Z: {}\n"
@@ -199,6 +207,39 @@ def test_signs_between_a_date_its_time_and_the_labels(
     ]
     got = read(tmp_path, "\n".join(rows) + "\n")
     np.testing.assert_allclose(got.t, np.arange(count) / apart, atol=2e-6)
+
+
+def test_what_a_program_prints_besides_speaks_against_no_labels(tmp_path: Path) -> None:
+    # a sketch for people: two lines of a sensor each among five of what it makes of
+    # them, with a rate that is that of its filter
+    beside = (
+        "mx = -55 my = {} mz = -41 mG\nGyro temperature is 29.{} degrees C\n"
+        "Yaw, Pitch, Roll: 342.{}, -4.27, -2.68\nGrav_x, Grav_y, Grav_z: 4{}.6, 2, 8 mg"
+        "\nLin_ax, Lin_ay, Lin_az: -6{}.9, 82.61, -0.53 mg\nrate = 2531{}.27 Hz\n"
+        "0, 0, -{} o/s\n34{}, -4, -2 ypr\n\n"
+    )
+    text = "".join(
+        f"ax = {1000 * AX[i]:.2f} ay = 8.18 az = 995.61 mg\n"
+        f"gx = -0.05 gy = {0.01 * i:.2f} gz = -1.88 deg/s\n"
+        + beside.format(*[i % 10] * 8)
+        for i in range(ROWS)
+    )
+    block = read(tmp_path, text, rate_hz=RATE)
+    assert block.t == pytest.approx(np.arange(ROWS) / RATE)
+    assert block.acc[:, 0] == pytest.approx(9.80665 * np.round(AX, 5))
+    assert block.gyr[:, 1] == pytest.approx(np.deg2rad(0.01 * np.arange(ROWS)))
+
+
+def test_a_few_labels_among_rows_of_words_and_numbers_are_no_form() -> None:
+    rows = [f"IMU {i} {AX[i]:.3f} 0.2 9.8 ok" for i in range(ROWS)]
+    status = ["battery: 3.7 current: 0.2 load: 11"] * 5
+    axes = ["ax: 0.1 ay: 0.2 az: 9.8"] * 5
+    assert not any(type(f).__name__ == "LabelledValues" for f in
+                   forms_of([*rows, *status], None))  # fmt: skip
+    # rows of numbers alone are no sentences
+    bare = [f"{AX[i]:.3f} 0.2 9.8" for i in range(ROWS)]
+    assert not any(type(f).__name__ == "LabelledValues" for f in
+                   forms_of([*bare, *axes], None))  # fmt: skip
 
 
 def test_a_monitor_that_says_when_a_row_came(tmp_path: Path) -> None:

@@ -269,6 +269,18 @@ def test_a_decision_by_limits_stands_on_top(bench: Path, tmp_path: Path) -> None
     assert "Take position 3 again: it disagrees. Too much bias; few." in text
 
 
+def test_what_nothing_is_left_to_check_is_not_to_be_applied(
+    material: ReportMaterial,
+) -> None:
+    found = material.calibration
+    assert found is not None and found.is_checked
+    for chi2, dof, checked in ((0.0, 0, False), (np.nan, 0, True), (3.0, 2, True)):
+        one = replace(found, chi2=chi2, dof=dof)
+        text = Tags(render(replace(material, calibration=one))).text
+        assert ("Apply it" in text) == checked == one.is_checked
+        assert ("nothing is left to check these numbers" in text) != checked
+
+
 def test_the_page_opens_with_what_to_do(material: ReportMaterial) -> None:
     found = material.calibration
     assert found is not None

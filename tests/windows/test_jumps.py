@@ -177,7 +177,9 @@ def test_a_log_of_rests_without_times_needs_no_more_than_its_rate(
     acc = rests(5, [60] * 8) / G
     path = write(tmp_path, acc, heading="ax,ay,az")
     assert main(["import", str(path), "-o", str(tmp_path / "s"), "--rate", "100"]) == 0
-    assert "only its rests were recorded" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "only its rests were recorded" in said
+    assert "8 still stretches\n" in said  # of 0.6 s
     made = Session.open(tmp_path / "s")
     assert len(made.about.positions) == 8
     # with times of their own the pauses between the rests would show
@@ -185,6 +187,26 @@ def test_a_log_of_rests_without_times_needs_no_more_than_its_rate(
     path = write(tmp_path, timed, "timed.csv", "t (s),ax,ay,az")
     assert main(["import", str(path), "-o", str(tmp_path / "timed")]) == 0
     assert "only its rests" not in capsys.readouterr().err
+
+
+def test_a_position_in_which_it_was_nudged_is_two(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # by 1.2 deg within a second, so by less than eight times the noise in five rows
+    acc = rests(5, [90] * 8)
+    angle = np.deg2rad(1.2) * np.clip((np.arange(90) - 36) / 20, 0, 1)
+    held = acc[270:360]
+    across = np.cross(held.mean(axis=0), [0.0, 0.0, 1.0])
+    across *= G / np.linalg.norm(across)
+    held += angle[:, None] * across
+    path = write(tmp_path, acc, heading="ax,ay,az")
+    call = ["import", str(path), "-o", str(tmp_path / "s"), "--gravity", str(G)]
+    assert main([*call, "--rate", "20"]) == 0
+    assert "1 of them is cut where it was moved" in capsys.readouterr().err
+    parts = [p for p in Session.open(tmp_path / "s").about.windows if p is not None]
+    assert len(parts) == 9
+    began, ended = 13.5 + 36 / 20, 13.5 + 56 / 20
+    assert began - 0.5 < parts[3][1] <= parts[4][0] < ended + 0.5
 
 
 def test_the_noise_of_a_row_is_that_of_its_steps_and_at_least_a_step() -> None:

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldcal.core.samples import Block, concat
+from fieldcal.core.samples import Array, Block, concat
 from fieldcal.session.folder import Session
 from fieldcal.windows import average, still_stretches, stretches
 from fieldcal.windows import rests as rest_module
 from fieldcal.windows.cells import CellAccumulator
+from fieldcal.windows.stretches import calm_parts
 
 
 def recording(
@@ -448,3 +449,22 @@ def test_only_what_goes_on_is_joined_at_a_seam() -> None:
     joined = stretches._join_at_seams(parts, [False, True, False, True, True])
     assert joined == [(0.0, 12.0), (15.0, 20.0), (20.1, 30.0), (31.0, 40.0)]
     assert stretches._join_at_seams([[], [(1.0, 2.0)]], [False, True]) == [(1.0, 2.0)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_nudge_amid_a_rest_leaves_both_levels_and_a_drift_leaves_none(
+    seed: int,
+) -> None:
+    t = np.arange(200) / 20
+    noise = np.random.default_rng(seed).normal(0, 0.01, (len(t), 3))
+
+    def parts(change: Array) -> list[tuple[float, float]]:
+        acc = noise + np.column_stack([0 * t, 0 * t, 9.8 + change])
+        block = Block.of(t, acc)
+        return calm_parts(lambda a, b: [block.between(a, b)], (0.0, float(t[-1])), 1.0)
+
+    (_, ended), (began, _) = parts(0.2 * (t > 4))
+    assert 3.5 < ended <= 4.15 and 4.0 <= began < 4.5
+    # what settles is at rest once it has settled; what creeps on is so nowhere
+    assert parts(0.4 * np.exp(-t / 1.5))[-1][0] < 5.0
+    assert parts(0.03 * t) == [(0.0, t[-1])]

@@ -15,6 +15,7 @@ from fieldcal.windows.joined_rests import RestPeriod, join_rests
 from fieldcal.windows.jumps import JumpFinder
 from fieldcal.windows.stretch_ends import stretch_end_reasons
 from fieldcal.windows.stretches import (
+    calm_parts,
     cell_rows,
     explain_no_stretch,
     still_stretches_of_file,
@@ -101,7 +102,11 @@ def find_rests(
         return RestSearch([], [], np.empty((0, 3)), "", "")
     if held := jumps.positions:
         how = f"{ONLY_RESTS}: it jumps {len(held) - 1} times"
-        found = [RestPeriod(*span) for span in held]
+        spans = [part for span in held for part in calm_parts(between, span, still)]
+        if more := len(spans) - len(held):
+            how += f", and {more} of them {'is' if more == 1 else 'are'} cut where it"
+            how += " was moved or knocked"
+        found = join_rests(rows, rest.origin, between, spans)
     else:
         how, spans = "", still_stretches_of_file(rows, rest.origin, between, still)
         found = join_rests(rows, rest.origin, between, spans)

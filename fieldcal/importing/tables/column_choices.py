@@ -8,7 +8,7 @@ from shlex import quote
 from fieldcal.core.samples import Array
 from fieldcal.importing.columns import OTHERS, SKIP, has_time
 from fieldcal.importing.headings.heading import Heading
-from fieldcal.importing.tables.column_physics import possible_columns
+from fieldcal.importing.tables.column_physics import likely_columns, possible_columns
 
 MOST = 4
 """Ways that are listed."""
@@ -51,11 +51,11 @@ def ask_of_choices(table: Array, way: Heading | None) -> str:
     fits = way is not None and len(way.columns) == k
     columns = way.columns if way is not None and fits else []
     names = [column.name for column in columns] or [""] * k
-    found = possible_columns(table, names, {})
-    if len(found) < len("ab"):
-        return ""
     skip = way.skip if way is not None and fits else SKIP
     places = [column.place for column in columns] or [""] * k
+    found = possible_columns(table, names, {})
+    if len(found) < len("ab"):
+        return _ask_of_rates(likely_columns(table, names, {}), places, skip)
     options = [
         quote(columns_option(one, places, skip)) for one in sorted(found, key=_apart)
     ]
@@ -65,6 +65,29 @@ def ask_of_choices(table: Array, way: Heading | None) -> str:
         "no name says what its columns are, and gravity turns by several of them: they"
         " are of several sensors. Add --columns"
         f" {' or --columns '.join(options[:MOST])}{more}"
+        f"{'' if timed else ', and --rate HZ, as no column is a time'}"
+    )
+
+
+def _ask_of_rates(
+    ways: Sequence[Mapping[int, str]], places: Sequence[str], skip: str
+) -> str:
+    """Ask which columns are the rates, where those of the forces are told; "" if not.
+
+    The last of `ways` has forces alone.
+    """
+    if not ways:
+        return ""
+    *beside, alone = ways
+    options = [
+        f"--columns {quote(columns_option(one, places, skip))}"
+        for one in (*beside[: MOST - 1], alone)
+    ]
+    timed = has_time(alone.values())
+    return (
+        "no name says what its columns are; three of them are as long as gravity, and"
+        " no turn tells which others are rates. Add"
+        f" {' or '.join(options)}{' without rates' if beside else ''}"
         f"{'' if timed else ', and --rate HZ, as no column is a time'}"
     )
 

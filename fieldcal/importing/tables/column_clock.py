@@ -119,7 +119,9 @@ class ColumnClock:
             acc, gyr = ([at[k + x] for x in "xyz" if k + x in at] for k in "ag")
             table = self._of.beginning() if len(acc) == len("xyz") else np.empty((0, 0))
             rates = rates_in_degrees(table, gyr, wanted)
-            means = len(table) and are_means(table[:, acc], None, rates)
+            means = len(table) and (
+                wanted.means or are_means(table[:, acc], None, rates)
+            )
             # of means nobody knows when: they are counted
             return replace(wanted, rate_hz=1.0) if means else wanted
         rate, where = said

@@ -32,6 +32,7 @@ from fieldcal.importing.units.rate_size import estimate_rate_unit, turns_deny
 from fieldcal.importing.units.scales import (
     ACC_OUT,
     ACC_SCALES,
+    binary_counts,
     fitting_scales,
     gain_scales,
 )
@@ -42,6 +43,10 @@ NOISY = 0.1
 
 EXACT = 5e-5
 """Part by which a direction's length differs: a sensor has scatter and bias."""
+
+AS_LONG, MOVED = 0.3, 0.1
+"""Part by which |a| differs from gravity in few rows, even of a moved device; and the
+share of these rows."""
 
 LEAST_COUNTS = 1000.0
 """Counts in a g by which an accelerometer is told without turns."""
@@ -133,8 +138,7 @@ def _force_and_rate_triples(
         alone = len(usual) == len(others) == 1
         return ((usual[0], others.pop()), why) if alone else None
     # of counts, any length is one: without a turn they are asked about
-    usual = [three for three in usual if _is_usual_gravity(sizes[three])
-             and unequal_lengths(table[:, list(three)]) is None]  # fmt: skip
+    usual = _gravity_alone(table, sizes)
     if len(usual) == 1:
         pairs = [p for p in permutations({*forces, *rates}, 2) if p[0] == usual[0]]
         apart = [rate for _, rate in pairs if not set(rate) & set(usual[0])]
@@ -144,6 +148,66 @@ def _force_and_rate_triples(
                 return (usual[0], None), f"{why}, and no others turn as they do"
             return (usual[0], apart[0] if apart else None), why
     return None
+
+
+def likely_columns(
+    table: Array, names: Sequence[str], known: Mapping[int, str]
+) -> list[dict[int, str]]:
+    """Channels by column where no turn tells the rates, the likeliest first.
+
+    The forces keep the length of gravity in most rows: of two sets that share axes at
+    rest, one does so when the device is moved. The rates stand beside them. The last
+    way has the likeliest forces alone.
+
+    Parameters
+    ----------
+    table, names, known : as of `identify_columns`
+
+    """
+    if len(table) < FEWEST_MEANS:
+        return []
+    free = free_columns(table, names, known)
+    sizes = _usual_forces(table, free.clock, free.forces)
+    usual = _gravity_alone(table, sizes)
+    if not usual:
+        return []
+    kept = {three: _share_of_gravity(table, three, sizes[three]) for three in usual}
+    most = max(kept.values())
+    forces = sorted(f for f in usual if kept[f] > most - MOVED)
+    ways = [
+        (force, rate) for force in forces for rate in free.rates
+        if not set(rate) & set(force)
+    ]  # fmt: skip
+    ways.sort(key=lambda way: (abs(way[1][0] - way[0][0]), way))
+    alone = {**free.channels, **channels_of("a", forces[0])}
+    return [
+        *({**free.channels, **channels_of("a", f), **channels_of("g", w)}
+          for f, w in ways), alone,
+    ]  # fmt: skip
+
+
+def _gravity_alone(table: Array, sizes: Mapping[Three, GravityReading]) -> list[Three]:
+    """Sets of axes whose length alone tells that they feel gravity."""
+    return [
+        three for three, size in sizes.items()
+        if (_is_usual_gravity(size) or _is_binary_g(table[:, list(three)], size))
+        and unequal_lengths(table[:, list(three)]) is None
+    ]  # fmt: skip
+
+
+def _is_binary_g(values: Array, size: GravityReading) -> bool:
+    """Whether numbers (n, 3) about as long as one are counts of a power of two in it.
+
+    Nothing else has both, so biases of a tenth of g are allowed for.
+    """
+    near = abs(float(np.log(size.size))) < ACC_OUT[1]
+    return near and binary_counts(values) > 0
+
+
+def _share_of_gravity(table: Array, three: Three, size: GravityReading) -> float:
+    """Share of rows in which three columns are about as long as gravity."""
+    length = np.linalg.norm(table[:, list(three)] - size.offset, axis=1)
+    return float((np.abs(length / size.size - 1) < AS_LONG).mean())
 
 
 def _usual_forces(
@@ -191,8 +255,10 @@ def _scattered(values: Array, size: float) -> bool:
     """Whether values (n, 3) are noise: their changes from row to row are large."""
     if are_means(values):
         return False
-    differ = np.abs(np.diff(values, axis=0))
-    return bool(np.nanmedian(differ, axis=0).max() > NOISY * size)
+    # between them may stand rows of another sensor
+    whole = values[np.isfinite(values).all(axis=1)]
+    differ = np.abs(np.diff(whole, axis=0))
+    return len(whole) > 1 and bool(np.median(differ, axis=0).max() > NOISY * size)
 
 
 def is_direction(values: Array) -> bool:

@@ -35,7 +35,7 @@ from fieldcal.importing.tables.column_source import column_numbers, rates_in_deg
 from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
-from fieldcal.importing.tables.means import scatter_columns
+from fieldcal.importing.tables.means import row_scatter, scatter_columns
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
 from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.importing.words.heading_words import heading_meaning
@@ -134,13 +134,21 @@ class ColumnRecording(Recording):
         t = table[:, at["t"]] * wanted.time_scale if "t" in at else None
         three = [[at[k + x] for x in "xyz" if k + x in at] for k in "ag"]
         gyr = rates_in_degrees(table, three[1], wanted)
-        if not are_means(table[:, three[0]], t, gyr):
+        if not (wanted.means or are_means(table[:, three[0]], t, gyr)):
             return None
         fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
         where = scatter_columns(next(fits, Heading([])).columns)
         means, values = (_columns_of(table, places) for places in (at, where))
         count = table[:, where["n"]] if "n" in where else None
         return MeanScatter(means, values, count, columns.has_time(wanted.columns))
+
+    def row_sigma(self, gravity: float) -> float | None:
+        """Standard deviation of its rows, m/s^2, if each may be a position."""
+        table, at = self.beginning(), column_numbers(self, self.wanted)
+        if not {"ax", "ay", "az"} <= set(at) or not len(table):
+            return None
+        acc = table[:, [at["ax"], at["ay"], at["az"]]] * self.wanted.acc_scale
+        return row_scatter(acc[np.isfinite(acc).all(axis=1)], gravity)
 
     def _found(self) -> dict[str, ReadOptions]:
         if self.wanted.columns:

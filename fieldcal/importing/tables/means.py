@@ -23,6 +23,7 @@ from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Index, concat
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.recording import MeanScatter, Recording
+from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.words.heading_words import (
     SCATTER,
     bare_axis,
@@ -45,6 +46,18 @@ OUTLIER_SIGMAS = 6.0
 SPARE = 3
 """Degrees of freedom that tell a scatter."""
 
+MOST_STEPS = 50
+"""Steps of a fit of (1): a sensor takes ten, what is none may take thousands."""
+
+MOST_SCALE = 0.5
+"""Part by which no scale factor is off."""
+
+MOST_ROWS = 1000
+"""Most rows that are taken for a position each: the search among causes grows with the
+square of their number, and takes some minutes then."""
+
+AS_CALM = 2.0
+"""Ratio of what remains of (1) to the noise of a row within which (1) is all of it."""
 
 ROUNDING_SHARE = 1e-9
 """Part of a mean below which a scatter is no noise of a sensor."""
@@ -125,6 +138,24 @@ def estimate_mean_uncertainty(
     )
 
 
+def row_scatter(acc: Array, gravity: float) -> float | None:
+    """Standard deviation of rows (n, 3), m/s^2, if (1) holds of all of them; else None.
+
+    So it is of a device that turns so slowly that it feels gravity alone, and of a few
+    readings in each position. What remains of (1) is then no more than rows that follow
+    each other differ by, less a turn that goes on.
+    """
+    if not COUPLED_PARAMETERS + SPARE <= len(acc) <= MOST_ROWS:
+        return None
+    shown = estimate_gravity(acc, means=True)
+    if shown is None or not shown.round:
+        return None
+    left = _residual(acc, COUPLED_PARAMETERS, gravity)
+    bends = np.abs(np.diff(acc, n=2, axis=0)) / np.sqrt(6)
+    noise = MAD_TO_SIGMA * np.median(bends, axis=0).max()
+    return left if left < AS_CALM * noise else None
+
+
 def _stated_uncertainty(said: str, means: Array) -> Array:
     """Standard uncertainty of means (n, 6) that the user states."""
     try:
@@ -158,15 +189,23 @@ def _sphere_residual(acc: Array, gravity: float) -> float:
     for free in (COUPLED_PARAMETERS, PLAIN_PARAMETERS):
         if len(acc) < free + SPARE:
             continue
-        return _fit(acc[_consistent_rows(acc, free, gravity)], free, gravity)[1]
+        return _residual(acc[_consistent_rows(acc, free, gravity)], free, gravity)
     return float("nan")
+
+
+def _residual(acc: Array, free: int, gravity: float) -> float:
+    """What remains of (1), m/s^2; nan if it holds of no sensor, as M = 0 has it."""
+    x, left = _fit(acc, free, gravity)
+    return left if np.abs(x[3:6]).max() < MOST_SCALE else float("nan")
 
 
 def _fit(acc: Array, free: int, gravity: float) -> tuple[Array, float]:
     """Parameters of (1), and the standard deviation that remains, m/s^2."""
     from scipy.optimize import least_squares
 
-    found = least_squares(_misfit, np.zeros(free), args=(acc, gravity))
+    found = least_squares(
+        _misfit, np.zeros(free), args=(acc, gravity), max_nfev=MOST_STEPS
+    )
     return found.x, float(np.sqrt(2 * found.cost / (len(acc) - free)))
 
 
@@ -259,17 +298,24 @@ def tables_of_means(
 
     """
     block = concat(recording.alone(stream).blocks(stream))
+    if len(block) > MOST_ROWS:
+        raise InputError(
+            f"{recording.path}: has {len(block)} rows, and --sigma says that each is a"
+            f" position: no more than {MOST_ROWS} are taken; leave it out if they are"
+            " samples, or write every tenth row or so"
+        )
     scale = np.repeat([recording.wanted.acc_scale, recording.wanted.gyr_scale], 3)
     rows = _rows_in_table(block.six, scatter.means * scale)
     # rows without any value are no positions
     told = np.isfinite(block.six).any(axis=1)
     block, rows = block[np.flatnonzero(told)], rows[told]
     many = None if scatter.many is None else scatter.many[rows]
-    found = estimate_mean_uncertainty(
-        block.six, scatter.values[rows] * scale, many, gravity
-    )
     if said:
         found = MeanUncertainty(_stated_uncertainty(said, block.six), "")
+    else:
+        found = estimate_mean_uncertainty(
+            block.six, scatter.values[rows] * scale, many, gravity
+        )
     if not np.isfinite(found.sigma[:, :3])[np.isfinite(block.acc)].all():
         raise InputError(
             f"{recording.path}: nothing says how well its {len(block)} means are known:"

@@ -2,7 +2,8 @@
 
 imu,t,ax,ay,az                     the column's name says that it tells devices
 1,0.00,0.1,0.2,9.8                 apart, or it holds words; rows of all of them
-2,0.00,0.1,0.3,9.7                 come in turn, about as many of each
+2,0.00,0.1,0.3,9.7                 come in turn, about as many of each. Numbers without
+                                   a name tell them if what stands beside differs
 """
 
 from __future__ import annotations
@@ -12,8 +13,15 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from fieldcal.importing.text.tagged_lines import is_of_sensor
-from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
+from fieldcal.importing.text.text_top import (
+    find_separator,
+    is_number,
+    parse_numbers,
+    split_cells,
+)
 
 NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "addr",
          "unit", "idx", "dev", "mac", "module", "devicename", "设备名称"}  # fmt: skip
@@ -30,6 +38,10 @@ MIN_ROWS = 20
 
 BALANCE = 3.0
 """Times that one has more rows than another."""
+
+APART, MOSTLY = 3.0, 0.8
+"""Times that rows of two devices differ by more than rows of one; and the least share
+of the rows that come in turn as others do, of devices that have only numbers."""
 
 TURNS = 0.05
 """Least share of rows that are of another than the row before."""
@@ -108,13 +120,39 @@ def find_instances(lines: Sequence[str], separator: str | None) -> ImuInstances 
         column = [row[i] for row in numbers]
         named = any(tells_devices(row[i]) for row in above)
         words = not any(is_number(cell, False) for cell in column)
-        if (named or words) and _in_turn(column) and not _are_sensors(column):
+        numbered = not above and _numbers_devices(numbers, i, parted)
+        if (
+            (named or words or numbered)
+            and _in_turn(column)
+            and not _are_sensors(column)
+        ):
             names = dict.fromkeys(column)
             zeros = [name for name in names if _is_silent(numbers, i, name)]
             silent = zeros if len(zeros) < len(names) else []
             live = tuple(name for name in names if name not in silent)
             return ImuInstances(i, parted, live, tuple(silent))
     return None
+
+
+def _numbers_devices(
+    rows: Sequence[Sequence[str]], i: int, separator: str | None
+) -> bool:
+    """Whether a column without a name numbers devices that come one after the other.
+
+    Each differs from the row before, which is of another device, by far more than from
+    its own row before. Of a counter that begins again and again it is otherwise.
+    """
+    column = [row[i] for row in rows]
+    many = len({*column})
+    if not 1 < many <= MAX_INSTANCES or not all(map(str.isdigit, {*column})):
+        return False
+    again = sum(a == b for a, b in zip(column, column[many:], strict=False))
+    if again < MOSTLY * len(column):
+        return False
+    table = parse_numbers([(separator or " ").join(row) for row in rows], separator)
+    beside, own = (np.median(np.abs(table[n:] - table[:-n]), axis=0)
+                   for n in (1, many))  # fmt: skip
+    return int((beside > APART * own).sum()) >= FEWEST_COLUMNS
 
 
 def tells_devices(name: str) -> bool:

@@ -16,11 +16,12 @@ the beginning was written by the serial monitor.
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 
+from fieldcal.importing.text.label_spellings import MAX_UNIT_LETTERS, plain_labels
 from fieldcal.importing.text.log_prefixes import STAMP, TICKS, TIME, log_prefix
+from fieldcal.importing.text.repeated_lines import NUMBER
 from fieldcal.importing.words.heading_units import parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.importing.words.sensor_words import AXES
@@ -28,50 +29,20 @@ from fieldcal.importing.words.sensor_words import AXES
 CLOCKS = frozenset((TIME, TICKS, STAMP))
 """Names that each line of a row may have."""
 
-MIN_LABEL_SHARE = 0.5
-"""Share of the commonest label's lines in which others are no column."""
-
-MAX_UNIT_LETTERS = 12
-"""Letters of a unit; what is longer is a sentence."""
-
 LONGEST = 2000
 """Characters of a line of values for people; a dump of bytes in one line has more."""
 
 SHAPES = 256
 """Kinds of lines whose names are remembered: a program prints a few."""
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_LIST = re.compile(
-    rf"(?<=[:=])\s*[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]"
-)
-_LISTED = re.compile(
-    rf"(\([^()]*\)|[A-Za-z])\s*\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]"
-)
-"""Values in a list right behind a label or its unit in brackets."""
-
-_DICT = re.compile(
-    r"[{(]\s*"
-    + r"\s*,\s*".join(rf"['\"]?{a}['\"]?\s*[:=]\s*({_NUMBER})" for a in AXES)
-    + r"\s*[})]",
-    re.IGNORECASE,
-)
-"""Three axes as Python prints them, or JavaScript."""
-
-_PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{_NUMBER}[\s,;|]*){{3,}}")
-_PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={_NUMBER})")
-"""Labels with a space before their value, where a line holds nothing else."""
-
-_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({_NUMBER}\D*)")
-"""A label with its value alone in a line, as programs print a temperature."""
-
-_SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
+_SENSOR = re.compile(r"(.*?:?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
 """What stands before an axis: something else, and the label of all its axes."""
 
 _IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| ?[(\[]([^()\[\]]+)[)\]])( [xyzXYZ])?")
 """A label that says the unit of its values."""
 
 _LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
-_VALUES = re.compile(rf"\s*({_NUMBER}(?:[\s,;|]+{_NUMBER})*)\s*(.*)", re.DOTALL)
+_VALUES = re.compile(rf"\s*({NUMBER}(?:[\s,;|]+{NUMBER})*)\s*(.*)", re.DOTALL)
 _STEM = re.compile(r"(.*[^\s_])[\s_]*[xyzXYZ]")
 """A label that ends with an axis, and what the other axes have before it."""
 
@@ -83,15 +54,13 @@ _TICKS = re.compile(
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 """Colours of a terminal."""
 
-_TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
-"""A line that holds nothing but a name."""
-
-_PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({_NUMBER})(?:\|\w*)?")
+_PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({NUMBER})(?:\|\w*)?")
 """A name, ms since 1970 and a value, as Teleplot reads them."""
 
 LEVEL = re.compile(
     r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*"
     r"|\s*[\[(](?i:debug|info|warning|warn|error|trace)[\])][\s:,-]*"
+    r"|\s*(?:debug|info|warning|warn|error|trace)(?:\([\w.]*\))?:\s+(?=[A-Za-z])"
 )
 """What programs write behind the time of a line."""
 
@@ -100,14 +69,11 @@ ARRIVAL = re.compile(
     r"\d{4}-\d\d-\d\d[-_T ]\d\d-\d\d-\d\d(?:\.\d+)?)\]?\s*(?:->|>|:+|,|\s)\s*"
 )
 
-_NAME = re.compile(r"\W*[A-Za-z][\w-]*:(?!\S)\W*")
-"""What stands alone before the first label: a chip or a program."""
+_NAME = re.compile(r"\W*([A-Za-z][\w-]*(?: #?\d+)?):(?!\S)\W*")
+"""What stands alone before the first label: a chip, a program, a sensor or a device."""
 
 _LETTER = re.compile("[A-Za-z_:]")
 """What a line with labels has, and one of numbers alone has not."""
-
-_WORD = re.compile(r"[A-Za-z_]\w*")
-_NAMED = re.compile(r"([A-Za-z_]\w*)\s*[:=]")
 
 _OF_ALL = {"", "xyz", "value", "values", "data", "axes"}
 """Words before an axis that say that others follow."""
@@ -120,7 +86,7 @@ NamedUnit = tuple[str, str]
 
 
 def labelled_values(line: str) -> list[Labelled]:
-    """Labels and values of a line; empty if it holds something else.
+    """Labels and values of a line, whatever it is called; empty if it has none.
 
     >>> labelled_values("Acceleration X: -0.1, Y: 0.2 m/s^2")
     [('Acceleration X [m/s^2]', '-0.1'), ('Acceleration Y [m/s^2]', '0.2')]
@@ -129,38 +95,44 @@ def labelled_values(line: str) -> list[Labelled]:
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
+    return named_values(line)[1]
+
+
+def named_values(line: str) -> tuple[str, list[Labelled]]:
+    """What stands alone before the labels of a line, and what they label.
+
+    >>> named_values("A: t: 1 x: 2 y: 3")
+    ('A', [('t', '1'), ('x', '2'), ('y', '3')])
+    """
     if len(line) > LONGEST or not _LETTER.search(line):
-        return []
+        return "", []
     if plotted := _PLOTTED.fullmatch(line.strip()):
-        return [(TICKS, plotted[2]), (plotted[1].strip(), plotted[3])]
+        return "", [(TICKS, plotted[2]), (plotted[1].strip(), plotted[3])]
     line = _COLOURS.sub("", line)
     prefix = log_prefix(line)
     line = line[prefix.length :] if prefix else line
-    line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
-    line = _LISTED.sub(r"\1: \2", line)
-    line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
-    line = _of_temperature(line)
+    line = plain_labels(line)
     arrival, ticks = ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
     rest = LEVEL.sub("", rest, 1) if LEVEL.match(rest) else rest
-    split = _split_labels(rest)
+    name, split = _split_labels(rest)
     parts, values = [], []
     for label, text in split:
         said = _VALUES.fullmatch(text)
-        behind = re.findall(_NUMBER, said[1]) if said else []
+        behind = re.findall(NUMBER, said[1]) if said else []
         if said is None or len(behind) not in (1, len(AXES)):
-            return []
+            return "", []
         values += behind
         parts.append((label, len(behind), said[2].strip(" \t,;|")))
     names = _names(tuple(parts))
     if names is None:
-        return []
+        return "", []
     read = [*zip(names, values, strict=True)]
     first = [(TIME, arrival[1].strip())] if read and arrival else []
     first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
     first += [(prefix.name, prefix.value)] if read and prefix else []
-    return first + read
+    return name, first + read
 
 
 @lru_cache(SHAPES)
@@ -179,7 +151,7 @@ def _names(parts: tuple[tuple[str, int, str], ...]) -> tuple[str, ...] | None:
         label, moved = _split_unit(label, read)
         if moved and read:
             read = _with_unit(read, moved)
-        label, unit = _complete_label(label, read)
+        label, unit = complete_label(label, read)
         names = [f"{label} {a}" for a in AXES] if many > 1 else [label]
         read += [(name, unit) for name in names]
         if len(behind) > MAX_UNIT_LETTERS:
@@ -189,68 +161,65 @@ def _names(parts: tuple[tuple[str, int, str], ...]) -> tuple[str, ...] | None:
     return tuple(f"{name} [{unit}]" if unit else name for name, unit in read)
 
 
-def _of_temperature(line: str) -> str:
-    """A line that holds a temperature alone, with what stands behind a label.
+def _split_labels(line: str) -> tuple[str, list[tuple[str, str]]]:
+    """What a line is called, and its labels with what stands behind each.
 
-    >>> _of_temperature("  Temperature 23.40 deg C"), _of_temperature("Sample 12")
-    ('Temperature: 23.40 deg C', 'Sample 12')
-    """
-    alone = _ALONE.fullmatch(line)
-    said = heading_meaning(alone[1]) if alone else None
-    if alone is None or said is None or said.kind != "temperature":
-        return line
-    return f"{alone[1]}: {alone[2]}"
-
-
-class TitledValues:
-    """Labels and values of lines in which a title names the sensor of the next axes.
-
-    Attributes
-    ----------
-    titles : lines of that kind so far
-
-    >>> titled = TitledValues()
-    >>> [titled.of(line) for line in ("--- Gyro (deg/s) ---", "X: 1 Y: 2")]
-    [[], [('Gyro X [deg/s]', '1'), ('Gyro Y [deg/s]', '2')]]
-    """
-
-    def __init__(self) -> None:
-        self._title = self._unit = ""
-        self.titles = 0
-
-    def of(self, line: str) -> list[Labelled]:
-        """Labels and values of the next line."""
-        read = labelled_values(line)
-        title = None if read else _TITLE.fullmatch(line)
-        if title is not None:
-            bare, unit = _complete_label(" ".join(title[1].split()), [])
-            said = heading_meaning(f"{bare} x")
-            if said is not None and said.kind:
-                self._title, self._unit = bare, f" [{unit}]" if unit else ""
-                self.titles += 1
-        if not self._title:
-            return read
-        return [(f"{self._title} {n}{self._unit}" if n.lower() in AXES else n, v)
-                for n, v in read]  # fmt: skip
-
-
-def _split_labels(line: str) -> list[tuple[str, str]]:
-    """Labels, and what stands behind each; none if anything stands before the first.
+    There are none if anything else stands before the first.
 
     >>> _split_labels("Accel: x= 1 | y= 2 Gyro: x= 3")
-    [('Accel x', '1 | '), ('y', '2'), ('Gyro x', '3')]
+    ('', [('Accel x', '1 | '), ('y', '2'), ('Gyro x', '3')])
     """
     parts = _LABEL.split(line)
     if len(parts) < len(AXES):
-        return []
+        return "", []
     labels, texts = [_bare_label(one) for one in parts[1::2]], parts[::2]
     for i, label in enumerate(labels):
         sensor = _SENSOR.fullmatch(texts[i])
         if sensor and label.lower() in AXES:
             texts[i], labels[i] = sensor[1], f"{sensor[2]} {label}"
+    if len({*labels}) < len(labels):
+        labels = [*_told_apart(tuple(labels))]
     if any(map(str.isalnum, _NAME.sub("", texts[0], 1))):
-        return []
-    return [*zip(labels, texts[1:], strict=True)]
+        return "", []
+    alone = _NAME.search(texts[0])
+    name, labels[0] = (alone[1], labels[0]) if alone else _of_line(tuple(labels))
+    return name, [*zip(labels, texts[1:], strict=True)]
+
+
+@lru_cache(SHAPES)
+def _told_apart(labels: tuple[str, ...]) -> tuple[str, ...]:
+    """Labels of which some are the same, with the words before the last such one.
+
+    >>> _told_apart(("left ax", "ay", "right ax", "ay"))
+    ('left ax', 'left ay', 'right ax', 'right ay')
+    """
+    found, before = [], ""
+    for label in labels:
+        words, _, axis = label.rpartition(" ")
+        said = heading_meaning(axis)
+        mine = said is not None and bool(said.axis)
+        before = words if mine and words else before
+        found.append(f"{before} {axis}" if mine and before else label)
+    return tuple(found)
+
+
+@lru_cache(SHAPES)
+def _of_line(labels: tuple[str, ...]) -> tuple[str, str]:
+    """What a line is called before its first label, and that label.
+
+    >>> _of_line(("left ax", "ay", "az")), _of_line(("Accel x", "y", "z"))
+    (('left', 'ax'), ('', 'Accel x'))
+    """
+    before, _, label = labels[0].rpartition(" ")
+    whole, said = heading_meaning(labels[0]), heading_meaning(label)
+    if (
+        (said is None or not said.axis)
+        # of other than measured accelerations it says what they are
+        or (whole is None or whole.weak or whole.kind != said.kind)
+        or any(" " in one for one in labels[1:])
+    ):
+        return "", labels[0]
+    return before.strip(" ->[](){}#:|"), label
 
 
 def _bare_label(label: str) -> str:
@@ -276,13 +245,13 @@ def _split_unit(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:
         return label, ""
     names = [name for name, _ in read]
     own = rest.lower() in AXES and (
-        _complete_label(rest, read)[0] in names
+        complete_label(rest, read)[0] in names
         or (bool(names) and names[-1].rpartition(" ")[0] == first)
     )
     return (label, "") if own else (rest, first)
 
 
-def _complete_label(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:
+def complete_label(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:
     """A label and its unit; of an axis alone with what the one before it says."""
     before, unit = read[-1] if read else ("", "")
     bare, _, axis = before.rpartition(" ")
@@ -304,34 +273,3 @@ def _with_unit(read: Sequence[NamedUnit], unit: str) -> list[NamedUnit]:
         return name == last or bool(stem and other and other[1] == stem[1])
 
     return [(n, u or (unit if mine(n) else "")) for n, u in read]
-
-
-def line_shape(line: str) -> str:
-    """A line without its numbers: the constant text of a program's output.
-
-    >>> line_shape("Temperature 25.31 deg C") == line_shape("Temperature -1 deg C")
-    True
-    """
-    return re.sub(_NUMBER, "", line).strip()
-
-
-def repeated_shapes(lines: Iterable[str], names: Iterable[str]) -> set[str]:
-    """Shapes that come more than once, of lines that say none of these names.
-
-    What has such a name and no value is a damaged row.
-
-    >>> repeated_shapes(["--", "ax: nan", "--", "ax: nan", "ready"], ["ax", "ay", "az"])
-    {'--'}
-    """
-    words = {w for name in names for w in _WORD.findall(name.partition(" [")[0])}
-    seen = Counter(
-        line_shape(line) for line in lines if not words & {*_NAMED.findall(line)}
-    )
-    return {one for one, times in seen.items() if times > 1 and one}
-
-
-def repeated_labels(rows: Iterable[Sequence[Labelled]]) -> list[str]:
-    """Labels that repeat, in their order."""
-    seen = Counter(name for row in rows for name, _ in row)
-    usual = max((m for name, m in seen.items() if name not in CLOCKS), default=0)
-    return [name for name, many in seen.items() if many >= MIN_LABEL_SHARE * usual]

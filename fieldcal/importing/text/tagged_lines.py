@@ -255,7 +255,9 @@ def _chosen(kinds: Sequence[LineKind]) -> tuple[LineKind | None, LineKind | None
     words = {kind.word for kind in plain}
     of = {s: [k for k in plain if is_of_sensor(k.word, s, words)] for s in SENSORS}
     if of["imu"] and not of["a"]:
-        return of["imu"][0], None
+        # imu1 and imu2 alone are devices: what tells those apart takes them all
+        alike = {(re.sub(r"\d+", "", kind.word), kind.width) for kind in kinds}
+        return (of["imu"][0], None) if len(alike) > 1 else (None, None)
     if of["a"]:
         first = of["a"][0]
         gyr = [k for k in of["g"] if not is_of_sensor(k.word, "a", words)]

@@ -29,19 +29,13 @@ that everything behind it knows columns of numbers alone.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from fieldcal.importing.text.bare_fractions import BareFractions
 from fieldcal.importing.text.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.text.dataflash_text import DataflashText
 from fieldcal.importing.text.grouped_digits import GroupedDigits
-from fieldcal.importing.text.labels import (
-    CLOCKS,
-    TitledValues,
-    line_shape,
-    repeated_labels,
-    repeated_shapes,
-)
+from fieldcal.importing.text.labelled_lines import LabelledValues
 from fieldcal.importing.text.labview_text import LabviewText
 from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
@@ -58,7 +52,6 @@ from fieldcal.importing.text.text_form import (
     Reader,
     TextForm,
     is_true_of_most,
-    take_row,
 )
 from fieldcal.importing.text.text_lines import split_quoted
 from fieldcal.importing.text.text_top import find_separator, split_cells
@@ -125,67 +118,6 @@ class QuotedCells(TextForm):
         return lambda lines: [
             self._new.join(split_quoted(line, self._old)) for line in lines
         ]
-
-
-class LabelledValues(TextForm):
-    """Values with their labels, as a program prints them for people.
-
-    Its other lines, those that come again and again, are no damaged rows.
-    """
-
-    def __init__(
-        self,
-        names: Sequence[str],
-        separator: str,
-        gathers: bool,
-        others: Collection[str],
-    ) -> None:
-        self.names, self._separator, self.gathers = tuple(names), separator, gathers
-        self._others = others
-
-    @classmethod
-    def of(cls, lines: Sequence[str], separator: str | None) -> LabelledValues | None:
-        """The form, if most lines have it."""
-        titled = TitledValues()
-        read = [titled.of(line) for line in lines]
-        many = [row for row in read if row]
-        names = repeated_labels(many)
-        told = len(many) + titled.titles
-        if told <= MOSTLY * len(lines) or len(names) < len("xyz"):
-            return None
-        gathers = max(len(row) for row in many) < len(names)
-        others = [one for one, row in zip(lines, read, strict=True) if not row]
-        return cls(names, separator or "\t", gathers, repeated_shapes(others, names))
-
-    def reader(self) -> Reader:
-        """Return what reads a text of this form from its beginning."""
-        row: dict[str, str] = {}
-        titled, begun = TitledValues(), False
-
-        def read(lines: Sequence[str]) -> list[str]:
-            nonlocal begun
-            found = []
-            for line in lines:
-                titles = titled.titles
-                said = titled.of(line)
-                bare = not said and titles == titled.titles
-                values = {k: v for k, v in said if k in self.names}
-                begun = begun or bool(values)
-                if said and not begun:
-                    # what stands above the rows may say their rate
-                    found.append(line)
-                if bare and line_shape(line) not in self._others:
-                    # no row: whoever reads rows says so
-                    found.append(line)
-                if (row.keys() & values.keys()) - CLOCKS:
-                    found.append(take_row(row, self.names, self._separator))
-                # a row has the time of its first line
-                row.update({k: v for k, v in values.items() if k not in row})
-                if len(row) == len(self.names):
-                    found.append(take_row(row, self.names, self._separator))
-            return found
-
-        return read
 
 
 class ArrivalPrefix(TextForm):

@@ -42,6 +42,10 @@ _GROUP = 8
 _QUIET = 0.3
 """Part of these groups that is taken for rest, the quietest."""
 
+_MIXED = 0.1
+"""Part of |a| that rows of a group differ by where they are of two positions, and that
+most rows do not differ by from the row before."""
+
 _ROUND = 0.03
 """Departure from a sphere, over its radius, of means that lie on one."""
 
@@ -128,12 +132,14 @@ def _follow_at_once(t: Array) -> bool:
     return bool(len(steps) and np.median(steps) < BETWEEN_POSITIONS_S)
 
 
-def estimate_gravity(acc: Array, t: Array | None = None) -> GravityReading | None:
+def estimate_gravity(
+    acc: Array, t: Array | None = None, means: bool = False
+) -> GravityReading | None:
     """Size of gravity in numbers (n, 3) of a file, by (1); None of too few.
 
-    `t` (n,) are the times of the rows, as in `are_means`.
+    `t` (n,) are the times of the rows, as in `are_means`; `means` says that they are.
     """
-    means = are_means(acc, t)
+    means = means or are_means(acc, t)
     acc = _readings(acc)
     if means:
         return _gravity_of(acc)
@@ -162,10 +168,19 @@ def unequal_lengths(acc: Array) -> tuple[float, float] | None:
 
 
 def _quiet_means(acc: Array) -> Array:
-    """Means (m, 3) of the quietest groups of rows."""
+    """Means (m, 3) of the quietest groups of rows; rows where groups mix attitudes.
+
+    A few readings in each position differ little from row to row, and by much in any
+    group, which has rows of two positions.
+    """
     groups = acc[: len(acc) // _GROUP * _GROUP].reshape(-1, _GROUP, 3)
     means, spread = groups.mean(axis=1), groups.std(axis=1).max(axis=1)
-    quiet: Array = means[spread <= np.quantile(spread, _QUIET)]
+    least = float(np.quantile(spread, _QUIET))
+    usual = float(np.median(np.linalg.norm(acc, axis=1)))
+    step = float(np.median(np.abs(np.diff(acc, axis=0)).max(axis=1)))
+    if step < _MIXED * usual < least:
+        return acc
+    quiet: Array = means[spread <= least]
     return quiet
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import IMPOSSIBLE_RATE_HZ, Array
 from fieldcal.importing.read_options import TIME_UNITS
-from fieldcal.importing.units.scales import MIN_ROWS, MIN_ROWS_ALONE
+from fieldcal.importing.units.scales import MIN_ROWS, MIN_ROWS_ALONE, rounded_text
 from fieldcal.importing.units.slow_times import turns_at_once
 
 RATES_HZ = (0.9, 8000.0)
@@ -116,6 +116,7 @@ def assumed_time_unit(
         )
     if not fits and step:
         _refuse_impossible_times(name, t, step)
+        _ask_about_fast_times(name, step)
     if not fits or fits == ["s"]:
         return "", ""
     rate = 1 / (TIME_UNITS[fits[0]] * step) if step else np.nan
@@ -165,6 +166,30 @@ def _refuse_impossible_times(name: str, t: Array, step: float) -> None:
         f"{name}: column t: its numbers, {known[0]:.10g} to {known[-1]:.10g}, make"
         f" {1 / step:.2g} Hz in s, and in no unit a rate that a recording has: name the"
         " column of the times with --columns, or skip this one with _ and give --rate"
+    )
+
+
+def _ask_about_fast_times(name: str, step: float) -> None:
+    """Ask about times, a `step` in s apart, that make more than any IMU writes.
+
+    Raises
+    ------
+    InputError
+        With the rates in longer units, of which a logger writes none as a rule.
+
+    """
+    if 1 / step <= RATES_HZ[1]:
+        return
+    rates = {u: 1 / (TIME_UNITS[u] * step) for u in ("min", "h", "d")}
+    longer = [
+        f"--time-unit {u} ({rounded_text(rate)} Hz)" for u, rate in rates.items()
+        if SLOW_HZ <= rate <= RATES_HZ[1]
+    ]  # fmt: skip
+    raise InputError(
+        f"{name}: column t: its times make {rounded_text(1 / step)} Hz in s, more than"
+        " an IMU writes: a program that runs faster than its sensor may have written"
+        f" them. Add {' or '.join(['--time-unit s', *longer])}, as it is, or skip the"
+        " column with _ and give --rate"
     )
 
 

@@ -108,7 +108,7 @@ class UnitGuess:
         self._name, self.said, self._read = name, said, said
         # a rate is that of samples, or of means that are counted
         of_rows = None if said.rate_hz else block.t
-        means = are_means(block.acc, of_rows)
+        means = said.means or are_means(block.acc, of_rows)
         # of means, the pauses between them say nothing
         if not (said.time_unit or said.rate_hz or means):
             unit, why = assumed_time_unit(name, block.t, block.acc, began)
@@ -120,7 +120,7 @@ class UnitGuess:
         block = replace(block, t=t)
         self._zero = said.acc_scale * said.zero
         written, block = block.acc, replace(block, acc=block.acc - self._zero)
-        gravity = estimate_gravity(block.acc, of_rows)
+        gravity = estimate_gravity(block.acc, of_rows, said.means)
         self._step = usual_step(t) if said.rate_hz is None else 1 / said.rate_hz
         if gravity and not said.acc_unit and said.acc_lsb == 1:
             self._acceleration(gravity, written)

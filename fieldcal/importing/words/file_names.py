@@ -6,6 +6,7 @@ Telephones and data sets write a file for each sensor: ``Gyroscope.csv``,
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from fieldcal.importing.words.heading_words import words_in_name
@@ -17,6 +18,13 @@ _SENSORS = {
 _OTHERS = ("mag", "magnetometer", "linear", "lin", "gravity", "imu", "and", "angle",
            "orientation")  # fmt: skip
 """Words of files that hold something else, or more."""
+
+_GLUED = re.compile(
+    rf"({'|'.join('raw my data log test static cal calib rpm hz the'.split())})?"
+    rf"({'|'.join(name for names in _SENSORS.values() for name in names)})"
+    rf"({'|'.join('raw data log test static cal calib file values only'.split())})?"
+)
+"""A sensor's name together with a word that says nothing of another quantity."""
 
 TOTAL = ("totalacceleration", "accelerometeruncalibrated")
 """Names of accelerations with gravity, whoever writes them."""
@@ -66,12 +74,17 @@ def sensor_of_file_name(stem: str) -> str:
 
     >>> [sensor_of_file_name(s) for s in ("TotalAcceleration", "gyro_exp01_user01")]
     ['acc', 'gyr']
-    >>> stems = ("acc_and_gyro", "userAcceleration", "log")
+    >>> [sensor_of_file_name(s) for s in ("rawaccdata", "33RPMgyr", "linacc")]
+    ['acc', 'gyr', '']
+    >>> stems = ("acc_and_gyro", "user_acceleration", "log")
     >>> [sensor_of_file_name(stem) for stem in stems]
     ['', '', '']
     """
     words = words_in_name(stem)
     before = dict(zip(words[1:], words, strict=False))
-    said = [sensor for sensor, names in _SENSORS.items() if {*words} & {*names}]
+    letters = re.findall("[a-z]+", stem.lower())
+    glued = {one[2] for word in letters if (one := _GLUED.fullmatch(word))}
+    own = {*words} | glued
+    said = [sensor for sensor, names in _SENSORS.items() if own & {*names}]
     more = {*words} & {*_OTHERS} or "user" in {before.get(w) for w in _SENSORS["acc"]}
     return said[0] if len(said) == 1 and not more else ""

@@ -1,0 +1,108 @@
+"""Labels and values as programs spell them, each as a label, a colon and its value.
+
+x 0.1 y 0.2 z 9.8                  x: 0.1 y: 0.2 z: 9.8
+accel x,y,z: 0.1, 0.2, 9.8         accel x: 0.1 y: 0.2 z: 9.8
+(ax, ay, az) = (0.1, 0.2, 9.8)     ax: 0.1 ay: 0.2 az: 9.8
+acc_xyz: 0.1, 0.2, 9.8             acc: 0.1, 0.2, 9.8
+ax: 0.1 (m/s²) ay: 0.2 (m/s²)      ax: 0.1 m/s², ay: 0.2 m/s²,
+accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}       Acc (mg) [ 10.1, -2.3, 999.1 ]
+"""
+
+from __future__ import annotations
+
+import re
+
+from fieldcal.importing.text.repeated_lines import NUMBER
+from fieldcal.importing.words.heading_units import parse_unit
+from fieldcal.importing.words.heading_words import heading_meaning
+from fieldcal.importing.words.sensor_words import AXES
+
+MAX_UNIT_LETTERS = 12
+"""Letters of a unit; what is longer is a sentence."""
+
+_LIST = re.compile(rf"(?<=[:=])\s*[\[({{<]\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*[\])}}>]")
+_LISTED = re.compile(
+    rf"(\([^()]*\)|[A-Za-z])\s*\[\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*\]"
+)
+"""Values in a list right behind a label or its unit in brackets."""
+
+_DICT = re.compile(
+    r"[{(]\s*"
+    + r"\s*,\s*".join(rf"['\"]?{a}['\"]?\s*[:=]\s*({NUMBER})" for a in AXES)
+    + r"\s*[})]",
+    re.IGNORECASE,
+)
+"""Three axes as Python prints them, or JavaScript."""
+
+_SPACED = re.compile(
+    r"\b" + r"[\s,;|]+".join(rf"({axis})\s+({NUMBER})" for axis in AXES), re.IGNORECASE
+)
+"""Three axes with a space before their value."""
+
+_BEHIND = re.compile(
+    rf"(?<![\w.])({NUMBER})\s*"
+    rf"[(\[]([^()\[\]\d][^()\[\]]{{0,{MAX_UNIT_LETTERS}}})[)\]](?!\s*[:=\[])"
+)
+"""A value with its unit in brackets behind it."""
+
+_NAMES = re.compile(
+    r"[(\[]?\b([A-Za-z_]\w*(?:\s*[,/]\s*[A-Za-z_]\w*)+)\s*[)\]]?\s*[:=]\s*"
+    rf"[(\[]?\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*[)\]]?"
+)
+"""Labels in a list, and a list of their values."""
+
+_OVER_AXES = re.compile(
+    r"([A-Za-z_)])[\s_(\[]+x\s*[,/]?\s*y\s*[,/]?\s*z\b\s*[)\]]?\s*[:=]", re.IGNORECASE
+)
+"""A label that lists the axes of its values."""
+
+_PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{NUMBER}[\s,;|]*){{3,}}")
+_PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={NUMBER})")
+"""Labels with a space before their value, where a line holds nothing else."""
+
+_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({NUMBER}\D*)")
+"""A label with its value alone in a line, as programs print a temperature."""
+
+
+def plain_labels(line: str) -> str:
+    """A line with a colon behind each label, and without brackets.
+
+    >>> plain_labels("accel x 0.1 y 0.2 z 9.8 (m/s^2)")
+    'accel x: 0.1 y: 0.2 z: 9.8 m/s^2, '
+    >>> plain_labels("gx, gy, gz : 1, 2, 3 dps"), plain_labels("Acc (mg) [ 1, 2, 3 ]")
+    ('gx: 1 gy: 2 gz: 3 dps', 'Acc (mg): 1, 2, 3')
+    """
+    line = _NAMES.sub(_pairs, line)
+    line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
+    line = _SPACED.sub(r"\1: \2 \3: \4 \5: \6", line)
+    line = _OVER_AXES.sub(r"\1:", line)
+    line = _BEHIND.sub(_bare_unit, line)
+    line = _LISTED.sub(r"\1: \2", line)
+    line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
+    return _of_temperature(line)
+
+
+def _pairs(said: re.Match[str]) -> str:
+    """Each label of a list with its value, if there are as many."""
+    names, values = re.split(r"\s*[,/]\s*", said[1]), re.findall(NUMBER, said[2])
+    if len(names) != len(values):
+        return said[0]
+    return " ".join(map("{}: {}".format, names, values)) + " "
+
+
+def _bare_unit(said: re.Match[str]) -> str:
+    """A value with its unit, and without what is none."""
+    return f"{said[1]} {said[2] if parse_unit(said[2]) else ''}, "
+
+
+def _of_temperature(line: str) -> str:
+    """A line that holds a temperature alone, with what stands behind a label.
+
+    >>> _of_temperature("  Temperature 23.40 deg C"), _of_temperature("Sample 12")
+    ('Temperature: 23.40 deg C', 'Sample 12')
+    """
+    alone = _ALONE.fullmatch(line)
+    said = heading_meaning(alone[1]) if alone else None
+    if alone is None or said is None or said.kind != "temperature":
+        return line
+    return f"{alone[1]}: {alone[2]}"

@@ -1,0 +1,108 @@
+"""What a line with labels is called says its sensor, or which device wrote it."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block, concat
+from fieldcal.importers import open_recording
+from fieldcal.importing.read_options import ReadOptions
+
+RATE, ROWS = 20.0, 80
+TURN = 0.02 * np.arange(ROWS)
+FORCE = np.round(9.8 * np.column_stack([np.sin(TURN), 0 * TURN, np.cos(TURN)]), 3)
+RATES = np.round(0.01 * np.column_stack([TURN, -TURN, 1 + TURN]), 4)
+
+
+def axes(values: Array, names: str = "x y z") -> str:
+    """Values with their labels, as a program prints them."""
+    return " ".join(f"{n}: {v:.4f}" for n, v in zip(names.split(), values, strict=True))
+
+
+def read(folder: Path, lines: list[str], timed: bool) -> dict[str, Block]:
+    path = folder / "log.txt"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    recording = open_recording(path, ReadOptions(rate_hz=None if timed else RATE))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return {
+            stream.name: concat(list(recording.alone(stream.name).blocks(stream.name)))
+            for stream in recording.streams()
+        }
+
+
+@pytest.mark.parametrize("words", ["A G M", "acc gyro mag", "Accel Gyro Magnetometer"])
+@pytest.mark.parametrize("late", [0.0, 0.004])
+def test_lines_of_a_sensor_each_with_its_time_are_of_one_row(
+    tmp_path: Path, words: str, late: float
+) -> None:
+    # as a row of their own each, rates and fields would be forces
+    acc, gyr, mag = words.split()
+    lines = [
+        f"{word}: t: {i / RATE + shift:.4f} {axes(values)}"
+        for i in range(ROWS)
+        for word, values, shift in (
+            (acc, FORCE[i], 0.0),
+            (gyr, RATES[i], late),
+            (mag, np.array([20.0, -30, 40]), 2 * late),
+        )
+    ]
+    (block,) = read(tmp_path, lines, True).values()
+    np.testing.assert_allclose(block.t, np.arange(ROWS) / RATE, atol=1e-9)
+    np.testing.assert_array_equal(block.acc, FORCE)
+    np.testing.assert_array_equal(block.gyr, RATES)
+
+
+FLIPPED = FORCE[:, ::-1] * [1, 1, -1]
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "{word}: t: {t:.3f} ax: {x} ay: {y} az: {z}",
+        "{word}: ax: {x} ay: {y} az: {z}",
+        "{word} ax: {x} ay: {y} az: {z}",
+        "[{word}] ax: {x} ay: {y} az: {z}",
+        "{word} - ax: {x} ay: {y} az: {z}",
+        "{word},{t:.3f},{x},{y},{z}",
+    ],
+)
+@pytest.mark.parametrize(
+    "words", [("left", "right"), ("imu1", "imu2"), ("MPU 1", "MPU 2")]
+)
+def test_what_lines_of_the_same_labels_are_called_tells_devices_apart(
+    tmp_path: Path, words: tuple[str, str], form: str
+) -> None:
+    forces = dict(zip(words, (FORCE, FLIPPED), strict=True))
+    lines = [
+        form.format(word=word, t=i / RATE, **dict(zip("xyz", force[i], strict=True)))
+        for i in range(ROWS)
+        for word, force in forces.items()
+    ]
+    head = ["imu,t,ax,ay,az"] if "," in form else []
+    got = read(tmp_path, head + lines, "{t" in form)
+    assert [*got] == [*words]
+    for word, force in forces.items():
+        np.testing.assert_allclose(got[word].t, np.arange(ROWS) / RATE, atol=1e-9)
+        np.testing.assert_array_equal(got[word].acc, force)
+
+
+def test_the_same_labels_twice_in_a_line_are_of_what_stands_before(
+    tmp_path: Path,
+) -> None:
+    lines = [
+        f"left {axes(a, 'ax ay az')} right {axes(b, 'ax ay az')}"
+        for a, b in zip(FORCE, FLIPPED, strict=True)
+    ]
+    got = read(tmp_path, lines, False)
+    assert [*got] == ["left", "right"]
+    np.testing.assert_array_equal(got["left"].acc, FORCE)
+    np.testing.assert_array_equal(got["right"].acc, FLIPPED)
+
+
+def test_a_number_in_what_a_line_is_called_may_count_lines(tmp_path: Path) -> None:
+    lines = [f"Sample {i}: {axes(FORCE[i], 'ax ay az')}" for i in range(ROWS)]
+    (block,) = read(tmp_path, lines, False).values()
+    np.testing.assert_array_equal(block.acc, FORCE)

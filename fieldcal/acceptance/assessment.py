@@ -241,7 +241,9 @@ def _removed_biases(
     held = windows.at_rest(session).averages
     seen = np.nan_to_num(calibration.vector("acc_bias")[0])
     gyroscopes = BiasSpread(
-        limits.gyr_bias_repeat, subtracts_gyro_offset(session.marks())
+        limits.gyr_bias_repeat,
+        subtracts_gyro_offset(session.marks()),
+        session.about.keeps_gyro_bias,
     )
     repeat = limits.acc_bias_repeat, gyroscopes
     return removed_bias_sentences(

@@ -12,12 +12,12 @@ from fieldcal.acceptance.tracked_bias import CASE, Cases
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 
-DEPENDENCE = (0.0, 0.01, 0.03, 0.1, 0.3)
+DEPENDENCE = (0.0, 0.01, 0.03, 0.1)
 """Dependence of gyroscopes on the position, mostly g-sensitivity, as part of the spread
 of their biases; all are equally likely. The Earth's rate is added except for the first,
 as in a simulation."""
 
-CALIBRATED, CALIBRATED_SHARE = 0.1, 0.1
+CALIBRATED, CALIBRATED_SHARE = 0.1, 0.03
 """Spread of biases that were calibrated before, as part of the usual one, and the share
 of devices with such."""
 
@@ -48,11 +48,13 @@ class BiasSpread:
     ----------
     repeat : spread from run to run, 1 sigma, rad/s
     averaged : whether the device reports a constant offset that it subtracts
+    stated : whether it is stated that the device subtracts none at rest
 
     """
 
     repeat: float
     averaged: bool = False
+    stated: bool = False
 
 
 def followed_cases(keeps: BiasSpread, density: Array) -> Cases:

@@ -74,7 +74,7 @@ MIN_WINDOWS = 2
 TRACKING = 0.01
 """Share of devices that subtract their bias at rest; low-cost ones often do."""
 
-UNBIASED = 0.01
+UNBIASED = 0.003
 """Share of gyroscopes of known bias, as of a simulation."""
 
 DOUBT = 0.1
@@ -100,12 +100,13 @@ def bias_removal_probability(
 ) -> tuple[float, str]:
     """Probability that the device subtracts its bias at rest, and how, in words.
 
-    0 if there are too few windows, or if a hand holds the device. `seen` are estimated
+    0 if there are too few windows, if a hand holds the device, or if it is stated that
+    it subtracts none. `seen` are estimated
     biases and their errors, (3,) each, rad/s. They count on axes that read zero in all
     samples at rest (`zero_rates`).
     """
     held = [one for w in windows if len(one := block.between(w.start, w.end))]
-    if _never_rests(held) or len(held) < MIN_WINDOWS:
+    if keeps.stated or len(held) < MIN_WINDOWS or _never_rests(held):
         return 0.0, ""
     zero = zero_rates(held)
     bias, sigma = (part[zero] for part in seen)

@@ -77,7 +77,9 @@ def removed_bias_sentences(
             f" zero, so that no bias stays in them ({what}): the device removes its"
             " bias at rest, so the recording does not contain it; switch this off"
             " (gyro bias estimation, auto calibration, zero velocity update) and record"
-            " again"
+            " again; if you know that it does no such thing, state it"
+            " (--keeps-gyro-bias of run and import, keeps_gyro_bias = true under"
+            " [device] in session.toml)"
         )
     odd = [name for name, p in mean_probabilities(block) if p < least]
     spread = np.hypot(repeat[0], seen)

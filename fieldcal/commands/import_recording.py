@@ -35,7 +35,7 @@ RARE = (
         "acc_zero",
     ),
     *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
-    *("lot", "station", "operator", *FACTORY_KEYS),
+    *("lot", "station", "operator", "keeps_gyro_bias", *FACTORY_KEYS),
 )
 
 EXAMPLE = """\

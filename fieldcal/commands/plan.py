@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from fieldcal.session.description import Description
 
 RARE = (
-    *("name", "serial", "lot", "station", "operator"),
+    *("name", "serial", "lot", "station", "operator", "keeps_gyro_bias"),
     *("grade", "gravity", "mounting", *FACTORY_KEYS),
 )
 

@@ -45,6 +45,7 @@ EXAMPLE = """\
 RARE = (
     *("seed", "patience", "sigma", "history", "limits", "junit", "no_report"),
     *("name", "lot", "station", "operator", "grade", "gravity", "angles_from"),
+    "keeps_gyro_bias",
     *FACTORY_KEYS,
 )
 

@@ -26,6 +26,12 @@ def add_site_options(parser: argparse.ArgumentParser, several: bool = False) -> 
     add("--operator", metavar="NAME", help="operator, for fieldcal lot")
     add("--grade", choices=GRADES, help="default: tactical")
     add_factory_options(group)
+    add(
+        "--keeps-gyro-bias",
+        action="store_true",
+        default=None,
+        help="the device subtracts no bias from its gyroscopes at rest",
+    )
     add("--latitude", type=float, metavar="DEG", help="of the site, for gravity")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
     add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
@@ -68,6 +74,7 @@ def tables_of_options(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
             "lot": args.lot,
             "grade": args.grade,
             **{name: getattr(args, name) for name in FACTORY_KEYS},
+            "keeps_gyro_bias": args.keeps_gyro_bias,
         },
         "site": {
             "station": args.station,

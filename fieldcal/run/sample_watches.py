@@ -26,7 +26,7 @@ class SampleWatches:
     def __init__(self, driver: Driver, about: Description) -> None:
         self.units = GyroUnitWatch(about.gravity)
         self._mixed = MixedDevicesWatch()
-        stated = bool(driver.notes.get("installed"))
+        stated = bool(driver.notes.get("installed")) or about.keeps_gyro_bias
         self._zero_rates = ZeroRatesWatch(about.grade, stated)
         self._said = set[tuple[int, str]]()
 

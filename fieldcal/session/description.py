@@ -136,6 +136,11 @@ class Description:
         return bool(self.raw.get("site", {}).get("sways", False))
 
     @property
+    def keeps_gyro_bias(self) -> bool:
+        """Whether it is stated that the device subtracts no bias at rest."""
+        return bool(self.device.get("keeps_gyro_bias", False))
+
+    @property
     def recording_id(self) -> str:
         """Id that the recorder wrote into the session; empty without one."""
         return str(self.raw.get("recording", {}).get("id", ""))

@@ -59,6 +59,11 @@ SESSIONS = (
         ("device restarted",),
         "13.8 sigma in some processes: the jump was carried with any of three sizes",
     ),
+    Session(
+        75280182,
+        ("device exchanged",),
+        "151 sigma: another device with similar biases and 33 times the noise",
+    ),
 )
 
 MOTIONS = (

@@ -62,6 +62,9 @@ def test_what_is_stated_on_resuming_is_in_the_session(tmp_path: Path) -> None:
     about = read_description(folder / "session.toml")
     assert about.raw["site"]["angle_setting_deg"] == 0.01
     assert about.level_deg == 0.02 and about.device["serial"] == "A1"
+    assert not about.keeps_gyro_bias
+    assert stated(folder, "--keeps-gyro-bias")
+    assert read_description(folder / "session.toml").keeps_gyro_bias
     assert stated(folder, "--angles", "0.02")  # stated anew
     assert not stated(folder)
     assert tomllib.loads((folder / "session.toml").read_text())["run"] == RUN

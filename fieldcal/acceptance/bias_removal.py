@@ -71,7 +71,7 @@ from fieldcal.windows import Average
 MIN_WINDOWS = 2
 """Fewest windows for (1)."""
 
-TRACKING = 0.01
+TRACKING = 0.03
 """Share of devices that subtract their bias at rest; low-cost ones often do."""
 
 UNBIASED = 0.003

@@ -47,6 +47,13 @@ the chance c that it changes."""
 SAME_STEPS = 0.9999, 0.3
 """Chance that the steps of outputs stay, of one device set alike, and of another."""
 
+SEEN = 2.0
+"""Change of the noise that is told of, in its standard deviations."""
+
+STEP_OF_NOISE = 0.1
+"""Least step, in noise of a sample, that is the device's: numbers of single precision
+have finer ones, which change with their size."""
+
 STEP_PART = 0.01
 """Part by which two steps that are the same may seem to differ."""
 
@@ -78,7 +85,7 @@ def exchange_text(
     if not before or not after:
         return ""
     noise = _NoiseChange.of(before, after)
-    stepped = _steps_change(block, at_s)
+    stepped = _steps_change(block, at_s, [*before, *after])
     log_odds = np.log(EXCHANGED / (1 - EXCHANGED))
     log_odds += _log_ratio_of_jumps(jump["bias"], limits) + noise.log_ratio()
     if stepped is not None:
@@ -88,8 +95,9 @@ def exchange_text(
     if chance <= DOUBT:
         return ""
     told = [*noise.told(), *(["the step of its outputs changes"] if stepped else [])]
+    also = "".join(f", {one}" for one in told)
     return (
-        f"at {at_s:.0f} s of device time the biases jump, and {' and '.join(told)}:"
+        f"at {at_s:.0f} s of device time the biases jump{also}:"
         " another device was put in its place, or its range or filter was set"
         f" otherwise (probability {chance:.2f}); record all positions of one device,"
         " set alike"
@@ -133,10 +141,12 @@ class _NoiseChange:
         return float(wide - same)
 
     def told(self) -> list[str]:
-        """The changes in words."""
+        """The changes that are seen, in words."""
+        each = zip(self.names, self.change, self.sigma, strict=True)
         return [
             f"the noise of the {name} is {np.exp(one):.2g} times what it was"
-            for name, one in zip(self.names, self.change, strict=True)
+            for name, one, sigma in each
+            if abs(one) > SEEN * sigma
         ]
 
 
@@ -166,11 +176,15 @@ def _log_ratio_of_jumps(
     return float(np.logaddexp(0.0, other - same) - np.log(2.0))
 
 
-def _steps_change(block: Block, at_s: float) -> bool | None:
-    """Whether the step of an output changes at a time, s; None if none has a step."""
+def _steps_change(block: Block, at_s: float, held: Sequence[Block]) -> bool | None:
+    """Whether the step of an output changes at a time, s; None if none has a step.
+
+    `held` are the windows at rest, which show the noise.
+    """
     cut = int(np.searchsorted(block.t, at_s))
     a, b = grids_of(block[:cut]), grids_of(block[cut:])
-    known = (a > 0) & (b > 0)
+    noise = np.median([white_noise(one.six) for one in held], axis=0)
+    known = np.minimum(a, b) > STEP_OF_NOISE * noise
     if not known.any():
         return None
     return bool((np.abs(a - b)[known] > STEP_PART * a[known]).any())

@@ -17,9 +17,9 @@ DEPENDENCE = (0.0, 0.01, 0.03, 0.1)
 of their biases; all are equally likely. The Earth's rate is added except for the first,
 as in a simulation."""
 
-CALIBRATED, CALIBRATED_SHARE = 0.1, 0.03
-"""Spread of biases that were calibrated before, as part of the usual one, and the share
-of devices with such."""
+SPREADS = ((1.0, 0.87), (10.0, 0.1), (0.1, 0.03))
+"""Spreads of biases, as parts of that from run to run, with the share of devices that
+have them: usual ones, lower grades than stated, and biases that were calibrated."""
 
 WALKS = (0.0, 1e-3, 1e-2, 1e-1)
 """Slow changes of a bias in `WALK_S`, as parts of the spread from run to run."""
@@ -28,7 +28,8 @@ WALK_S = 30.0
 """Time of `WALKS`, s."""
 
 PUT_IN = (0.0, 0.1, 1.0)
-"""What a turn puts into the bias that is subtracted, as parts of the same spread."""
+"""What a turn puts into a bias that is kept, or into that which is subtracted, as parts
+of the same spread."""
 
 TIME_CONSTANTS = np.geomspace(0.25, 512.0, 12)
 """Time constants with which a bias may be followed, s."""
@@ -79,15 +80,17 @@ def averaged_cases(density: Array) -> Cases:
 
 def kept_cases(keeps: BiasSpread, density: Array, blind: float) -> Cases:
     """Cases in which the bias is kept, of which a time after each turn is not used."""
-    usual, small = keeps.repeat, CALIBRATED * keeps.repeat
-    starts = [(usual**2, 1 - CALIBRATED_SHARE), (small**2, CALIBRATED_SHARE)]
+    usual = keeps.repeat
+    starts = [((part * usual) ** 2, share) for part, share in SPREADS]
     if keeps.averaged:
         left = [float(density.mean() / s) for s in AVERAGES]
         starts = [(start, share / 2) for start, share in starts]
         starts += [(var, 0.5 / len(left)) for var in left]
     rows = [
-        ((np.inf, start, w, 0.0, walk, blind), share)
-        for (start, share), w, walk in product(starts, _felt(keeps), _walks(keeps))
+        ((np.inf, start, w, (part * usual) ** 2, walk, blind), share)
+        for (start, share), w, part, walk in product(
+            starts, _felt(keeps), PUT_IN, _walks(keeps)
+        )
     ]
     cases = _cases(row for row, _ in rows)
     weights = np.array([share for _, share in rows])

@@ -23,10 +23,10 @@ at rest to those of gyroscopes that keep a bias is
 
 Cases are time constants, what turns put into the estimate, the dependence of w on how
 the device lies, and slow changes of the bias (`bias_cases`). A bias that is kept has a
-spread of s_b. A few devices had theirs calibrated before, so that no rates are taken
-for those of a device that removes its bias only because they are small: they must also
-return to zero, or be smaller than the Earth's rate. Of a share UNBIASED the bias is
-known: only the Earth's rate stays (`earth_rate_alone`).
+spread of s_b, or ten times that, and a few were calibrated before, so that no rates are
+taken for those of a device that removes its bias only because they are small: they must
+also return to zero, or be smaller than the Earth's rate. Of a share UNBIASED the bias
+is known: only the Earth's rate stays (`earth_rate_alone`).
 
 A device may also subtract the mean of its first T seconds at rest until the next turn.
 After that, its rates are the noise of the mean, of another value after each turn,
@@ -71,7 +71,7 @@ from fieldcal.windows import Average
 MIN_WINDOWS = 2
 """Fewest windows for (1)."""
 
-TRACKING = 0.03
+TRACKING = 0.01
 """Share of devices that subtract their bias at rest; low-cost ones often do."""
 
 UNBIASED = 0.003

@@ -192,15 +192,23 @@ def test_limits_hold_for_the_job_only() -> None:
     assert signal.getsignal(signal.SIGXCPU) is handler
 
 
+class Burning(JobTask):
+    """A task that makes a session for ever, also in a process of its own."""
+
+    def _session(self, place: Path) -> Path:
+        return burn(self, place)
+
+
 def test_a_worker_in_a_thread_survives_a_job_beyond_its_processor_time(
-    tmp_path: Path, session: Path
+    tmp_path: Path, session: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As a worker of Dask is one: killed, it would lose others and be tried again."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
     bounds = ServiceBounds(seconds=1)
     jobs = JobStore(tmp_path, bounds)
     folder = str(jobs.folder(added(jobs, zipped(session), "s.zip").id))
     pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
-    (made,) = run_tasks([folder], JobTask(bounds), pool)
+    (made,) = run_tasks([folder], Burning(bounds), pool)
     assert made.value is not None and made.value.error is not None, made
     assert made.value.error.startswith("took more than 0.0166667 min of processor time")
 

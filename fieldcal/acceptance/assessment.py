@@ -88,8 +88,7 @@ def assess(
         doubts=[
             *insistence_doubts(marks),
             *broken_axis_messages(session.block.six),
-            *_removed_biases(calibration, session, windows, limits),
-            *_exchanges(calibration, session, windows, limits),
+            *_bias_faults(calibration, session, windows, limits),
         ],
         windows=windows.at_rest(session).averages,
         position_numbers=windows.position_numbers,
@@ -181,8 +180,7 @@ def with_faults(
         *broken_axis_messages(session.block.six),
     ]
     wrong += [bias_jump_warning(calibration, limits)]
-    wrong += _removed_biases(calibration, session, windows, limits)
-    wrong += _exchanges(calibration, session, windows, limits)
+    wrong += _bias_faults(calibration, session, windows, limits)
     wrong = [w for w in wrong if w]
     warnings = (*wrong, *calibration.warnings, *filter(None, unknown))
     return replace(calibration, warnings=warnings, good=calibration.good and not wrong)
@@ -219,25 +217,13 @@ def _undetermined_by_omission(
     )
 
 
-def _exchanges(
+def _bias_faults(
     calibration: Calibration,
     session: Session,
     windows: UsableWindows,
     limits: GradeLimits,
 ) -> list[str]:
-    """Sentence if another device seems to follow from some time on."""
-    held = windows.at_rest(session).averages
-    said = exchange_text(calibration, session.block, held, limits)
-    return [said] if said else []
-
-
-def _removed_biases(
-    calibration: Calibration,
-    session: Session,
-    windows: UsableWindows,
-    limits: GradeLimits,
-) -> list[str]:
-    """Sentences if biases of the size found were subtracted from the recording."""
+    """Sentences if biases were subtracted, or if those of another device follow."""
     held = windows.at_rest(session).averages
     seen = np.nan_to_num(calibration.vector("acc_bias")[0])
     gyroscopes = BiasSpread(
@@ -246,10 +232,12 @@ def _removed_biases(
         session.about.keeps_gyro_bias,
     )
     repeat = limits.acc_bias_repeat, gyroscopes
-    return removed_bias_sentences(
+    removed = removed_bias_sentences(
         held, session.block, repeat, seen, limits.fit_chance,
         calibration.vector("gyr_bias"),
     )  # fmt: skip
+    exchanged = exchange_text(calibration, session.block, held, limits)
+    return [*removed, *filter(None, [exchanged])]
 
 
 def store_in_history(

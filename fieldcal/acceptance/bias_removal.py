@@ -1,25 +1,14 @@
 """Detects gyroscopes whose bias the device subtracts at rest.
 
-Means of n windows of an output with an offset of exactly zero, each with the error that
-white noise gives it, have
-
-    chi2 = sum over windows of (mean / sigma)^2,   P(chi2 or less; n)              (1)
-
-If biases repeat within s_b from run to run, and the gyroscopes measure the Earth's
-rate, the probability of means so close to zero, with an error s of each axis over all
-windows, is
-
-    P = product over axes of min(1, 4 s / (sqrt(2 pi) sqrt(s_b^2 + w_E^2 / 3)))    (2)
-
-A device removes it where it sees that it rests. One that is held in a hand is turned to
-and fro all the time and never sees that; its means are zero within that motion,
-whatever the bias, so that nothing is said of it.
+A device removes the bias where it sees that it rests. One that is held in a hand is
+turned to and fro all the time and never sees that; its means are zero within that
+motion, whatever the bias, so that nothing is said of it.
 
 A device may follow its bias at rest (`tracked_bias`). The likelihood ratio of its rates
 at rest to those of gyroscopes that keep a bias is
 
     B = mean over cases of p(rates | follows) / mean over cases of p(rates | keeps)
-                                                                                   (3)
+                                                                                   (1)
 
 Cases are time constants, what turns put into the estimate, the dependence of w on how
 the device lies, and slow changes of the bias (`bias_cases`). A bias that is kept has a
@@ -31,7 +20,7 @@ is known: only the Earth's rate stays (`earth_rate_alone`).
 A device may also subtract the mean of its first T seconds at rest until the next turn.
 After that, its rates are the noise of the mean, of another value after each turn,
 
-    u = 0,  var w = S / T;     B = mean over T of B of the rates later than T      (4)
+    u = 0,  var w = S / T;     B = mean over T of B of the rates later than T      (2)
 
 and both kinds are as likely. An autopilot that reports the offset that it subtracts
 has, with even odds, averaged it over any T when it started: a bias of S / T then
@@ -64,12 +53,12 @@ from fieldcal.acceptance.rest_steps import (
 )
 from fieldcal.acceptance.tracked_bias import Cases, log_likelihoods
 from fieldcal.acceptance.zero_rates import log_odds_of_no_bias, zero_rates
-from fieldcal.core.probability import chi2_tail, probability_of_log_odds
+from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import Array, Block, Index
 from fieldcal.windows import Average
 
 MIN_WINDOWS = 2
-"""Fewest windows for (1)."""
+"""Fewest windows that tell anything."""
 
 TRACKING = 0.01
 """Share of devices that subtract their bias at rest; low-cost ones often do."""
@@ -101,9 +90,8 @@ def bias_removal_probability(
     """Probability that the device subtracts its bias at rest, and how, in words.
 
     0 if there are too few windows, if a hand holds the device, or if it is stated that
-    it subtracts none. `seen` are estimated
-    biases and their errors, (3,) each, rad/s. They count on axes that read zero in all
-    samples at rest (`zero_rates`).
+    it subtracts none. `seen` are estimated biases and their errors, (3,) each, rad/s.
+    They count on axes that read zero in all samples at rest (`zero_rates`).
     """
     held = [one for w in windows if len(one := block.between(w.start, w.end))]
     if keeps.stated or len(held) < MIN_WINDOWS or _never_rests(held):
@@ -138,7 +126,7 @@ def _removal_behind_noise(
     alone = [earth_rate_alone(steps, density, float(k["blind"][0])) for k in kinds]
     ratios = [found.log_ratio(i, len(kinds) + i, one) for i, one in enumerate(alone)]
     share = np.array([1.0] + [1 / len(averaged)] * len(averaged)) / 2
-    every = np.array(ratios) + np.log(share)  # (3), (4)
+    every = np.array(ratios) + np.log(share)  # (1), (2)
     chance = float(probability_of_log_odds(np.logaddexp.reduce(every) + prior))
     return chance, way_of_removal(found.likeliest(int(np.argmax(every))))
 
@@ -205,14 +193,3 @@ def _never_rests(held: Sequence[Block]) -> bool:
             means = one.gyr[: each * parts].reshape(parts, each, 3).mean(axis=1)
             moves.append(float(np.median(np.nan_to_num(means.std(axis=0)))))
     return bool(moves) and float(np.median(moves)) > MOVED
-
-
-def chi2_about_zero(means: Array, sigma: Array) -> tuple[float, float]:
-    """Chi-squared of means, and the probability of a larger one, (1)."""
-    chi2 = float(np.sum((means / sigma) ** 2))
-    return chi2, chi2_tail(chi2, len(means))
-
-
-def chance_near_zero(sigma: Array, spread: float | Array) -> float:
-    """Probability that offsets of a spread come so close to zero on all axes, (2)."""
-    return float(np.minimum(4 * sigma / np.sqrt(2 * np.pi) / spread, 1.0).prod())

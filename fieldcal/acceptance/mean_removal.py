@@ -13,16 +13,20 @@ afterwards, the mean is larger: with windows that are parts f of all samples,
 with d = 0 if values are rounded to the nearest step, -1/2 if they are rounded down, and
 -1/2 times the mean of their signs if they are rounded toward zero; in windows that are
 rounded to zero q is twice as large. Values that were on this grid before are all moved
-by the same part of a step, so d = 0 and the sum in (2) is 1. For each of the four, the
-probability follows from (1) and (2) of `bias_removal` over all axes, with s_b of
-accelerometers; the least of them counts, times four (Bonferroni).
+by the same part of a step, so d = 0 and the sum in (2) is 1. For each of the four, if
+biases repeat within s_b from run to run, means come so near over all axes with
+
+    chi2 = sum ((m - q d) / s)^2
+    P = P(chi2 or less) prod min(1, 4 s / (sqrt(2 pi) s_b))                        (3)
+
+and the least of them counts, times four (Bonferroni).
 
 Later changes of the samples, such as interpolation, move a mean slightly. If no mean
 was subtracted, m is the sum of the mean force and the bias b. For m to be so small, the
 mean force has to be near -b. For any normal distribution of the mean force about zero,
 the probability of that on each axis is at most
 
-    x = 2 |m| / (sqrt(2 pi e) |b|),   P = x (1 + L + L^2 / 2),   L = -ln x          (3)
+    x = 2 |m| / (sqrt(2 pi e) |b|),   P = x (1 + L + L^2 / 2),   L = -ln x          (4)
 
 with x in P the product over axes, as that of three numbers drawn evenly from 0 to 1.
 Device axes, SI.
@@ -40,9 +44,8 @@ from fieldcal.acceptance.bias_removal import (
     DOUBT,
     UNKNOWN,
     bias_removal_probability,
-    chance_near_zero,
-    chi2_about_zero,
 )
+from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import ACC, CHANNELS, Array, Block
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import Average
@@ -111,7 +114,7 @@ def mean_probabilities(block: Block) -> list[tuple[str, float]]:
 def rounded_mean_probability(
     windows: Sequence[Average], block: Block, repeat: float | Array, least: float
 ) -> float:
-    """Probability that means are so close to those left by rounding by chance, (2).
+    """Probability that means are so close to those left by rounding by chance, (3).
 
     1 if values are not rounded to a grid, or if the means differ significantly.
     """
@@ -130,21 +133,31 @@ def rounded_mean_probability(
     found = [1.0]
     for shift, wide in ways:
         sigma = np.sqrt(noise + wide * step**2 / 12)  # (2)
-        _, larger = chi2_about_zero(mean - step * shift, sigma)
+        larger = _chance_of_more(mean - step * shift, sigma)
         if larger >= least:
-            found.append((1.0 - larger) * chance_near_zero(sigma, repeat))
+            found.append((1.0 - larger) * _chance_near_zero(sigma, repeat))  # (3)
     return min(len(ways) * min(found), 1.0)
 
 
+def _chance_of_more(means: Array, sigma: Array) -> float:
+    """Probability of a larger chi-squared than that of means about zero."""
+    return chi2_tail(float(np.sum((means / sigma) ** 2)), len(means))
+
+
+def _chance_near_zero(sigma: Array, spread: float | Array) -> float:
+    """Probability that offsets of a spread come so close to zero on all axes."""
+    return float(np.minimum(4 * sigma / np.sqrt(2 * np.pi) / spread, 1.0).prod())
+
+
 def altered_mean_probability(block: Block, seen: Array) -> float:
-    """Probability that the force cancels biases of this size on all axes, (3)."""
+    """Probability that the force cancels biases of this size on all axes, (4)."""
     known = np.isfinite(block.acc)
     if not known.any(axis=0).all():
         return 1.0
     mean = np.abs(np.nanmean(block.acc, axis=0))
     density = 1 / (sqrt(2 * pi * e) * np.maximum(np.abs(seen), 1e-300))
     x = max(float(np.minimum(2 * mean * density, 1.0).prod()), 1e-300)
-    return min(x * (1 - log(x) + log(x) ** 2 / 2), 1.0)  # (3)
+    return min(x * (1 - log(x) + log(x) ** 2 / 2), 1.0)  # (4)
 
 
 def _noise(values: Array) -> float:

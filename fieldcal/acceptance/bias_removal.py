@@ -5,7 +5,7 @@ turned to and fro all the time and never sees that; its means are zero within th
 motion, whatever the bias, so that nothing is said of it.
 
 A device may follow its bias at rest (`tracked_bias`). The likelihood ratio of its rates
-at rest to those of gyroscopes that keep a bias is
+at rest to those of gyroscopes that keep a bias (`bias_evidence`) is
 
     B = mean over cases of p(rates | follows) / mean over cases of p(rates | keeps)
                                                                                    (1)
@@ -22,36 +22,34 @@ After that, its rates are the noise of the mean, of another value after each tur
 
     u = 0,  var w = S / T;     B = mean over T of B of the rates later than T      (2)
 
-and both kinds are as likely. An autopilot that reports the offset that it subtracts
-has, with even odds, averaged it over any T when it started: a bias of S / T then
-remains. Of gyroscopes with a bias at most one in x has a B above x; a share TRACKING of
-all devices removes the bias.
+If the rates during T were recorded, those before the subtraction are known, and take
+the place of the outputs in the likelihood of a device that removes its bias
+(`subtracted_means`). A bias that is followed is as likely as both of these. An
+autopilot that reports the offset that it subtracts has, with even odds, averaged it
+over any T when it started: a bias of S / T then remains. Of gyroscopes with a bias at
+most one in x has a B above x; a share TRACKING of all devices removes the bias.
 Device axes, rad/s. Source: Markov's inequality for a likelihood ratio.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.acceptance.bias_cases import (
-    BiasSpread,
-    averaged_cases,
-    followed_cases,
-    kept_cases,
-    way_of_removal,
+from fieldcal.acceptance.bias_cases import BiasSpread
+from fieldcal.acceptance.bias_evidence import (
+    removals_by_likelihood,
+    removals_of_recorded_means,
 )
-from fieldcal.acceptance.earth_rate_alone import earth_rate_alone
 from fieldcal.acceptance.rest_steps import (
     SPECTRUM,
-    RestStep,
     noise_of_samples,
     rest_steps,
     sample_period,
+    stops_at_rest,
 )
-from fieldcal.acceptance.tracked_bias import Cases, log_likelihoods
+from fieldcal.acceptance.subtracted_means import steps_before_means
 from fieldcal.acceptance.zero_rates import log_odds_of_no_bias, zero_rates
 from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import Array, Block, Index
@@ -63,10 +61,7 @@ MIN_WINDOWS = 2
 TRACKING = 0.01
 """Share of devices that subtract their bias at rest; low-cost ones often do."""
 
-UNBIASED = 0.003
-"""Share of gyroscopes of known bias, as of a simulation."""
-
-DOUBT = 0.1
+DOUBT = 0.05
 """Probability of such a device above which there is no GO."""
 
 LEAST_NOISE = 1e-4
@@ -118,69 +113,16 @@ def _removal_behind_noise(
         return 0.0, ""
     of_second = np.nanmedian(noise, axis=0) * np.sqrt(sample_period(held[0]))
     density = np.maximum(of_second, LEAST_NOISE * keeps.repeat) ** 2
-    steps = rest_steps(held, block, axes, noise)
-    averaged = averaged_cases(density)
-    kinds = [followed_cases(keeps, density), *np.split(averaged, len(averaged))]
-    rivals = [kept_cases(keeps, density, float(kind["blind"][0])) for kind in kinds]
-    found = _LogEvidence.of(steps, density, keeps, [*kinds, *rivals])
-    alone = [earth_rate_alone(steps, density, float(k["blind"][0])) for k in kinds]
-    ratios = [found.log_ratio(i, len(kinds) + i, one) for i, one in enumerate(alone)]
-    share = np.array([1.0] + [1 / len(averaged)] * len(averaged)) / 2
-    every = np.array(ratios) + np.log(share)  # (1), (2)
+    stops = stops_at_rest(held, block, noise)
+    ways = [
+        *removals_by_likelihood(rest_steps(stops, axes), density, keeps),
+        *removals_of_recorded_means(
+            *steps_before_means(stops, block, axes), density, keeps
+        ),
+    ]
+    every = np.array([way.log_odds for way in ways])  # (1), (2)
     chance = float(probability_of_log_odds(np.logaddexp.reduce(every) + prior))
-    return chance, way_of_removal(found.likeliest(int(np.argmax(every))))
-
-
-@dataclass(frozen=True, slots=True)
-class _LogEvidence:
-    """Log likelihoods of groups of cases, with their shares.
-
-    Attributes
-    ----------
-    groups : (h,) cases each
-    logs, chi2 : (h,) each, log likelihood plus the log of the share, and chi-squared
-    means : number of means that each group uses
-
-    """
-
-    groups: Sequence[Cases]
-    logs: Sequence[Array]
-    chi2: Sequence[Array]
-    means: Sequence[float]
-
-    @classmethod
-    def of(
-        cls,
-        steps: Sequence[RestStep],
-        density: Array,
-        keeps: BiasSpread,
-        groups: Sequence[Cases],
-    ) -> _LogEvidence:
-        """The evidence of steps at rest."""
-        cases, ends = np.concatenate(groups), np.cumsum([len(g) for g in groups])[:-1]
-        logs, chi2, count = log_likelihoods(steps, density, keeps.repeat**2, cases)
-        logs = logs + np.log(cases["share"])
-        means = [float(part[0]) for part in np.split(count, ends)]
-        return cls(groups, np.split(logs, ends), np.split(chi2, ends), means)
-
-    def log_ratio(self, group: int, other: int, unbiased: float) -> float:
-        """Log of the ratio of two groups' likelihoods, the latter with UNBIASED.
-
-        `unbiased` is the log likelihood of gyroscopes of known bias.
-
-        What neither explains, such as a knock, does not tell them apart: the log is
-        divided by the chi-squared of a mean.
-        """
-        best = min(float(self.chi2[g][np.argmax(self.logs[g])]) for g in (group, other))
-        excess = max(1.0, best / max(self.means[group], 1.0))
-        a, b = (np.logaddexp.reduce(self.logs[g]) for g in (group, other))
-        kept = np.logaddexp(b + np.log1p(-UNBIASED), unbiased + np.log(UNBIASED))
-        return float((a - kept) / excess)
-
-    def likeliest(self, group: int) -> Cases:
-        """The likeliest case of a group."""
-        found: Cases = self.groups[group][int(np.argmax(self.logs[group]))]
-        return found
+    return chance, ways[int(np.argmax(every))].how
 
 
 def _never_rests(held: Sequence[Block]) -> bool:

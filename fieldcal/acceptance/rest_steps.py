@@ -1,4 +1,4 @@
-"""Rates at rest in the windows, and how long the device rests between them.
+"""Rates at rest in the windows, and how long the device rests before and after them.
 
 A window is cut into a few means over equal numbers of samples. Their noise is that of
 the samples at high frequencies, which a removal of the bias leaves as it is.
@@ -6,8 +6,8 @@ the samples at high frequencies, which a removal of the bias leaves as it is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,9 @@ deviations by which an octave below the band of a filter has more power."""
 
 PIECE_S = 0.25
 """Length of the means between windows, s, which tell when the device begins to turn."""
+
+NEAR = 4
+"""Number of such means at the end of a window, with which they are compared."""
 
 TURNS, NOISES = 2e-3, 8.0
 """Least rate of a turn about an axis, rad/s, and in standard deviations of a mean."""
@@ -38,36 +41,71 @@ class RestStep:
     ----------
     seconds : its length, s; 0 if the turn alone is known
     since_turn : when it began, s after the last turn, or after the first window began
-    rates : (a,) rad/s, mean rates; nan where none are known
+    rates : (..., a) rad/s, mean rates; nan where none are known
     turned : whether the device was turned before it
     lost : whether samples are missing there for so long that it may have been off
 
+    `seconds` and `since_turn` of several ways to cut a window have a last axis of 1.
+
     """
 
-    seconds: float
-    since_turn: float
+    seconds: float | Array
+    since_turn: float | Array
     rates: Array
     turned: bool = False
     lost: bool = False
 
 
-def rest_steps(
-    held: Sequence[Block], block: Block, axes: Index, noise: Array
-) -> list[RestStep]:
-    """Steps of rest of some axes in windows of a block, in the order of time.
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A window in which the device rests, between two turns.
 
-    `noise` is that of `noise_of_samples`.
+    Attributes
+    ----------
+    window : its samples
+    noise : (a,) rad/s, noise of a sample; nan where there is none
+    settled : time at rest before it since a turn, s; 0 before the first window
+    stays : time at rest after it, s
+    turned : whether the device was turned before it
+    lost : whether samples are missing there for so long that it may have been off
+
     """
+
+    window: Block
+    noise: Array
+    settled: float = 0.0
+    stays: float = 0.0
+    turned: bool = False
+    lost: bool = False
+
+    def enclosed(self, steps: Iterable[RestStep]) -> Iterator[RestStep]:
+        """Steps of the window, after and before those of the rest around it."""
+        unknown = np.full(len(self.noise), np.nan)
+        if self.turned:
+            yield RestStep(self.settled, 0.0, unknown, turned=True, lost=self.lost)
+        yield from steps
+        if self.stays:
+            since = self.settled + self.window.t[-1] - self.window.t[0]
+            yield RestStep(self.stays, since, unknown)
+
+
+def stops_at_rest(held: Sequence[Block], block: Block, noise: Array) -> list[Stop]:
+    """Stops with the windows of a block; `noise` is that of `noise_of_samples`."""
     largest = float(np.nanmax(noise, initial=0.0))
-    steps: list[RestStep] = []
-    since = 0.0
-    for i, one in enumerate(held):
-        if i:
-            steps += _between(held[i - 1], one, block, largest, since, len(axes))
-            since = steps[-1].seconds
-        steps += _cells(one, axes, noise[i], since)
-        since = steps[-1].since_turn + steps[-1].seconds
-    return steps
+    stops: list[Stop] = []
+    for one, own in zip(held, noise, strict=True):
+        if not stops:
+            stops.append(Stop(one, own))
+            continue
+        stays, settled, lost = _between(stops[-1].window, one, block, largest)
+        stops[-1] = replace(stops[-1], stays=stays)
+        stops.append(Stop(one, own, settled, turned=True, lost=lost))
+    return stops
+
+
+def rest_steps(stops: Sequence[Stop], axes: Index) -> list[RestStep]:
+    """Steps of rest of some axes, in the order of time."""
+    return [step for stop in stops for step in stop.enclosed(_cells(stop, axes))]
 
 
 def noise_of_samples(held: Sequence[Block], axes: Index) -> Array:
@@ -81,23 +119,24 @@ def sample_period(one: Block) -> float:
     return float(np.median(np.diff(one.t)))
 
 
-def _cells(one: Block, axes: Index, noise: Array, since: float) -> Iterator[RestStep]:
-    """Means of a window that begins so long after a turn, s."""
+def _cells(stop: Stop, axes: Index) -> Iterator[RestStep]:
+    """Means of a window."""
+    one = stop.window
     each = -(-len(one) // CELLS)
     count = len(one) // each
     means = one.gyr[: count * each, axes].reshape(count, each, -1).mean(axis=1)
-    means[:, np.isnan(noise)] = np.nan
+    means[:, np.isnan(stop.noise)] = np.nan
     seconds = each * sample_period(one)
     for k, mean in enumerate(means):
-        yield RestStep(seconds, since + k * seconds, mean)
+        yield RestStep(seconds, stop.settled + k * seconds, mean)
 
 
 def _between(
-    before: Block, after: Block, block: Block, noise: float, since: float, axes: int
-) -> Iterator[RestStep]:
-    """Rest after a window until a turn begins, and after it until the next window."""
+    before: Block, after: Block, block: Block, noise: float
+) -> tuple[float, float, bool]:
+    """Rest after a window until a turn, and before the next, s; if samples are lost."""
     first, last = np.searchsorted(block.t, [before.t[-1], after.t[0]]).tolist()
-    gap, unknown = block[first + 1 : last], np.full(axes, np.nan)
+    gap = block[first + 1 : last]
     lost = bool(np.diff(block.t[first : last + 1]).max(initial=0.0) > LOST_S)
     each = max(round(PIECE_S / sample_period(before)), 1)
     count = len(gap) // each
@@ -105,13 +144,13 @@ def _between(
     bound = max(TURNS, NOISES * noise / np.sqrt(each))
 
     def pieces_at_rest(window: Block, way: int) -> int:
-        off = np.nan_to_num(np.abs(means - window.gyr.mean(axis=0)).max(axis=1))
+        beside = window.gyr[::-way][: NEAR * each].mean(axis=0)
+        off = np.nan_to_num(np.abs(means - beside).max(axis=1))
         return int(np.argmin(np.append(off[::way] < bound, False)))
 
     rested = pieces_at_rest(before, 1)
     settled = pieces_at_rest(after, -1) if rested < count else 0
-    yield RestStep(rested * PIECE_S, since, unknown)
-    yield RestStep(settled * PIECE_S, 0.0, unknown, turned=True, lost=lost)
+    return rested * PIECE_S, settled * PIECE_S, lost
 
 
 def white_noise(gyr: Array) -> Array:

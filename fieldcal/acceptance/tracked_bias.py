@@ -32,6 +32,9 @@ SENT_AFTER = 0.02
 """Part of the noise, in power, that comes behind the subtraction, as that of rounding
 does."""
 
+NO_TIME = 1e-9
+"""Least time of a step, s, in which nothing changes."""
+
 CASE = np.dtype(
     [
         (name, float)
@@ -60,7 +63,7 @@ def log_likelihoods(
 
     Parameters
     ----------
-    steps : of rest
+    steps : of rest; results have the leading axes of their rates before h
     density : (a,) spectral density S of the white noise, (rad/s)^2 s
     restart : variance of a change of the bias where the device may have been off
     cases : what the device may do
@@ -70,18 +73,17 @@ def log_likelihoods(
     for step in steps:
         if step.turned:
             found.turn(restart if step.lost else 0.0)
-        if step.seconds > 0:
-            found.rest(step)
-    return found.log_likelihood.sum(axis=0), found.chi2.sum(axis=0), found.count
+        found.rest(step)
+    return found.log_likelihood.sum(axis=-2), found.chi2.sum(axis=-2), found.count
 
 
 class _Filter:
-    """Means and covariances of u and w, (a, h) each.
+    """Means and covariances of u and w, (..., a, h) each.
 
     Attributes
     ----------
-    log_likelihood, chi2 : (a, h) of the means so far
-    count : (h,) of these means
+    log_likelihood, chi2 : (..., a, h) of the means so far
+    count : (..., h) of these means
 
     """
 
@@ -100,7 +102,8 @@ class _Filter:
 
     def rest(self, step: RestStep) -> None:
         """Time passes, (2), and the mean over it is taken in, (3)."""
-        cases, s = self._cases, step.seconds
+        cases = self._cases
+        s = np.maximum(step.seconds, NO_TIME)[..., None]
         x = s / cases["tau"]
         part = -np.expm1(-x)
         follows, x_or_1 = x > 0, np.where(x > 0, x, 1.0)
@@ -109,10 +112,11 @@ class _Filter:
         own = np.where(follows, change / x_or_1**2, density / s)
         own = own + SENT_AFTER * density / s
         gain, common = np.where(follows, part / x_or_1, 1.0), -change / x_or_1
-        seen = np.isfinite(step.rates)[:, None] & (step.since_turn >= cases["blind"])
+        late = np.asarray(step.since_turn)[..., None] >= cases["blind"]
+        seen = np.isfinite(step.rates)[..., None] & late
         r_u, r_w = self._uu + self._uw, self._uw + self._ww  # covariances with u + w
         rate, r_r = self._u + self._w, r_u + r_w
-        off = np.where(seen, np.nan_to_num(step.rates)[:, None] - gain * rate, 0.0)
+        off = np.where(seen, np.nan_to_num(step.rates)[..., None] - gain * rate, 0.0)
         var = gain**2 * r_r + own
         to_u = np.where(seen, gain * (r_u - part * r_r) + common, 0.0) / var
         to_w = np.where(seen, gain * r_w, 0.0) / var
@@ -125,4 +129,4 @@ class _Filter:
         told = np.where(seen, np.log(var) + off**2 / var, 0.0)
         self.log_likelihood = self.log_likelihood - 0.5 * told
         self.chi2 = self.chi2 + off**2 / var
-        self.count = self.count + seen.sum(axis=0)
+        self.count = self.count + seen.sum(axis=-2)

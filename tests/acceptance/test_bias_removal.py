@@ -70,11 +70,13 @@ def test_so_noisy_a_device_may_be_at_zero_by_chance() -> None:
 
 
 def test_a_bias_that_is_tracked_leaves_nothing() -> None:
+    """What is followed within a few seconds looks as if means were subtracted."""
     rng = np.random.default_rng(2)
     for seconds in (0.5, 3.0, 15.0, 100.0):
         windows, block = at_rest(rng, -7e-3, seconds)
         chance, what = bias_removal_probability(windows, block, KEEPS)
-        assert chance > 0.5 and "time constant" in what
+        assert chance > 0.5
+        assert "time constant" in what or (seconds < 5 and "as a mean over" in what)
     assert bias_removal_probability(windows[:1], block, KEEPS) == (0.0, "")
 
 
@@ -111,12 +113,9 @@ def zeroed_at_rest(
     return windows, block
 
 
-@pytest.mark.parametrize("seconds", [6.0, 10.0])
+@pytest.mark.parametrize("seconds", [1.0, 2.0, 6.0, 10.0])
 def test_a_bias_that_is_taken_out_at_each_stop_leaves_noise(seconds: float) -> None:
-    """Its means scatter by more than those of white noise, and are about zero.
-
-    A mean over less than five seconds leaves as much as the Earth's rate.
-    """
+    """Its means scatter by more than those of white noise, and are about zero."""
     rng = np.random.default_rng(4)
     for _ in range(3):
         windows, block = zeroed_at_rest(rng, -7e-3, seconds)

@@ -10,6 +10,7 @@ from fieldcal.acceptance.rest_steps import (
     noise_of_samples,
     rest_steps,
     sample_period,
+    stops_at_rest,
 )
 from fieldcal.core.samples import Array, Block
 
@@ -46,15 +47,15 @@ def test_noise_is_that_of_white_noise_and_nan_without_any() -> None:
 def test_rest_between_windows_ends_and_begins_with_the_turn() -> None:
     block = recording((25.0, 31.0))
     windows = held(block, (2.0, 22.0), (34.0, 54.0))
-    steps = rest_steps(windows, block, AXES, noise(windows))
+    steps = rest_steps(stops_at_rest(windows, block, noise(windows)), AXES)
     count = len(steps) // 2 - 1
     assert CELLS - 2 < count <= CELLS
     before, after = steps[count : count + 2]
     assert before.seconds == pytest.approx(3.0, abs=0.3) and not before.turned
     assert after.seconds == pytest.approx(3.0, abs=0.3) and after.turned
     assert not after.lost and np.isnan([before.rates, after.rates]).all()
-    times = [step.since_turn for step in steps[count + 2 :]]
-    length = steps[0].seconds
+    times = [float(step.since_turn) for step in steps[count + 2 :]]
+    length = float(steps[0].seconds)
     np.testing.assert_allclose(times, after.seconds + length * np.arange(count))
     assert 20.0 - length < count * length <= 20.0 + 1e-6
     mean = np.mean([step.rates for step in steps if np.isfinite(step.rates).all()], 0)
@@ -64,10 +65,10 @@ def test_rest_between_windows_ends_and_begins_with_the_turn() -> None:
 def test_windows_side_by_side_have_a_turn_between_them() -> None:
     block = recording()
     windows = held(block, (0.0, 30.0), (30.0, 60.0))
-    steps = rest_steps(windows, block, AXES, noise(windows))
-    between = steps[CELLS : CELLS + 2]
-    assert [step.seconds for step in between] == [0.0, 0.0]
-    assert [step.turned for step in between] == [False, True]
+    steps = rest_steps(stops_at_rest(windows, block, noise(windows)), AXES)
+    turned = [step.turned for step in steps]
+    assert turned == [k == CELLS for k in range(2 * CELLS + 1)]
+    assert steps[CELLS].seconds == 0.0
 
 
 def test_samples_that_are_missing_may_hide_a_restart() -> None:
@@ -76,7 +77,7 @@ def test_samples_that_are_missing_may_hide_a_restart() -> None:
         kept = np.flatnonzero((whole.t < 28.0) | (whole.t > 28.0 + missing))
         block = whole[kept]
         windows = held(block, (2.0, 22.0), (34.0, 54.0))
-        steps = rest_steps(windows, block, AXES, noise(windows))
+        steps = rest_steps(stops_at_rest(windows, block, noise(windows)), AXES)
         assert [s.lost for s in steps if s.turned] == [missing > 0.5]
 
 
@@ -84,7 +85,8 @@ def test_an_axis_without_noise_in_a_window_has_no_rate_there() -> None:
     block = recording()
     block.gyr[:1500, 0] = 0.01
     windows = held(block, (0.0, 30.0), (30.0, 60.0))
-    steps = rest_steps(windows, block, AXES[:2], noise(windows)[:, :2])
+    stops = stops_at_rest(windows, block, noise(windows)[:, :2])
+    steps = rest_steps(stops, AXES[:2])
     unknown = [np.isnan(step.rates).tolist() for step in steps]
     assert unknown[:CELLS] == [[True, False]] * CELLS
-    assert unknown[CELLS + 2 :] == [[False, False]] * CELLS
+    assert unknown[CELLS + 1 :] == [[False, False]] * CELLS

@@ -50,7 +50,7 @@ def reference(
     u[0], var[0] = 1.0, one["start"]
     var[1 : 2 + len(turns)] = one["felt"]
     rows: list[Array] = []
-    means, own = [], []
+    means, own = [], list[float]()
     for k, step in enumerate(every):
         if step.turned:
             window += 1
@@ -70,7 +70,7 @@ def reference(
         if np.isfinite(step.rates[0]) and step.since_turn >= blind:
             rows.append(total)
             means.append(step.rates[0])
-            own.append(SENT_AFTER * DENSITY / step.seconds)
+            own.append(SENT_AFTER * DENSITY / float(step.seconds))
     map_ = np.array(rows)
     cov = (map_ * var) @ map_.T + np.diag(own)
     dense = multivariate_normal(cov=cov).logpdf(means)

@@ -41,8 +41,9 @@ GROUPED = {
     "positions in the wrong order, one forgotten": (
         "positions swapped", "a position forgotten",
     ),
-    "angles exchanged, counted the other way, in radians": (
+    "angles exchanged, counted the other way, in radians, as a slope, read coarsely": (
         "angles exchanged", "an angle counted the other way", "angles in radians",
+        "angles as a slope", "angles read coarsely",
     ),
     "windows that begin or end while it is turned": (
         "windows begun early", "windows ended late",
@@ -55,8 +56,8 @@ GROUPED = {
         "table tilted", "table kicked", "ground gives way", "level and angles not said",
         "level said wrongly",
     ),
-    "a device that slips in its mount": (
-        "slips in its mount",
+    "a device that slips in its mount, or is fastened askew": (
+        "slips in its mount", "fastened askew",
     ),
     "latitude not said, its sign wrong, gravity wrong": (
         "latitude not said", "only gravity said", "other hemisphere",
@@ -107,6 +108,9 @@ GROUPED = {
     "samples held, out of order, of two clocks; a clock set; significant digits": (
         "sampled and held", "packets out of order", "sensors on two clocks",
         "clock set", "few significant digits",
+    ),
+    "gravity's direction alone, ranges or calibrations that change": (
+        "gravity's direction alone", "ranges by itself", "calibrates itself",
     ),
     "two days, two devices or two mountings in one": (
         "two days joined", "device exchanged", "device remounted",

@@ -150,6 +150,20 @@ def slipping(bench: Bench, rng: Rng) -> Bench:
     return acting(bench, slips=(x, y, z), slip_s=when)
 
 
+def crooked(bench: Bench, rng: Rng) -> Bench:
+    """The device is fastened 0.1 to 5 degrees askew."""
+    axis = rng.normal(size=3)
+    size = np.deg2rad(log_uniform(rng, 0.1, 5.0)) / np.linalg.norm(axis)
+    x, y, z = (size * axis).tolist()
+    return acting(bench, slips=(x, y, z), slip_s=-10.0)
+
+
+def read_coarsely(bench: Bench, rng: Rng) -> Bench:
+    """Angles are read to the next 0.05 to 1 degrees, and said to be set better."""
+    step = np.deg2rad(log_uniform(rng, 0.05, 1.0))
+    return wrongly_set(bench, rng.uniform(-step / 2, step / 2, bench.off.shape))
+
+
 def sinking(bench: Bench, rng: Rng) -> Bench:
     """Soft ground gives way by 0.02 to 0.5 degrees, in 50 to 500 s."""
     size = float(np.deg2rad(log_uniform(rng, 0.02, 0.5))) * float(rng.choice([-1, 1]))
@@ -175,6 +189,8 @@ BEFORE: dict[str, Before] = OF_FIXTURE | {
     "table kicked": kicked,
     "ground gives way": sinking,
     "slips in its mount": slipping,
+    "fastened askew": crooked,
+    "angles read coarsely": read_coarsely,
 }
 
 

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 
 from benchmarks.never_wrong.bench import EARTH, Bench, Samples
 from benchmarks.never_wrong.file_mistakes import OF_FILE
+from benchmarks.never_wrong.firmware_mistakes import OF_FIRMWARE
 from benchmarks.never_wrong.joined_mistakes import OF_TWO
 from benchmarks.never_wrong.recording import recorded
 from benchmarks.never_wrong.said_mistakes import SAID
@@ -229,6 +230,7 @@ AFTER: dict[str, After] = (
     SAID
     | OF_FILE
     | OF_TWO
+    | OF_FIRMWARE
     | {
         "g labelled m/s²": acc_in_g,
         "deg/s labelled rad/s": gyr_in_deg,

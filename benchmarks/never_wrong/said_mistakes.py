@@ -132,6 +132,16 @@ def angles_in_other_units(written: Written, bench: Bench, rng: Rng) -> Written:
     return _saying(written, rows)
 
 
+def angles_as_slope(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Angles up to 60 degrees are written as a slope in per cent, as a level shows."""
+    rows = _rows(written)
+    for row in _stated(rows, bench):
+        for key in ANGLES:
+            if abs(row[key]) <= 60.0:
+                row[key] = 100.0 * float(np.tan(np.deg2rad(row[key])))
+    return _saying(written, rows)
+
+
 def sign_forgotten(written: Written, bench: Bench, rng: Rng) -> Written:
     """An angle of one position is written with the other sign."""
     rows = _rows(written)
@@ -194,6 +204,7 @@ SAID: dict[str, After] = {
     "an angle counted the other way": angle_reversed,
     "angles in radians": angles_in_radians,
     "angles in gon, mil or mrad": angles_in_other_units,
+    "angles as a slope": angles_as_slope,
     "a sign forgotten": sign_forgotten,
     "plan of another session": other_plan,
     "a position forgotten": one_forgotten,

@@ -118,7 +118,7 @@ def test_a_position_that_was_not_taken_is_the_one_before() -> None:
 
 @pytest.mark.parametrize(
     "said", ["angles exchanged", "an angle counted the other way", "angles in radians",
-             "angles in gon, mil or mrad", "a sign forgotten"],
+             "angles in gon, mil or mrad", "angles as a slope", "a sign forgotten"],
 )  # fmt: skip
 def test_angles_that_are_said_wrongly_may_be_of_fewer_positions(said: str) -> None:
     bench = _ideal("five")
@@ -233,3 +233,45 @@ def test_a_log_that_is_stopped_at_each_turn_has_the_rests_alone() -> None:
     assert len(s.t) < len(every.t) and np.abs(s.gyr).max() < 1e-3
     assert _means(bench, s) == pytest.approx(_means(bench, every))
     assert np.count_nonzero(np.diff(s.t) > 1.0) == len(bench.windows) - 1
+
+
+def test_a_direction_of_gravity_has_no_scale_factor_and_no_bias() -> None:
+    bench = replace(_ideal("five"), acc_scale=np.array([1.01, 0.99, 1.02]))
+    seen = _made("gravity's direction alone", bench).samples.acc
+    assert np.linalg.norm(seen, axis=1) == pytest.approx(np.full(len(seen), 9.80665))
+    before = _samples(bench).acc
+    assert seen[0] / 9.80665 == pytest.approx(before[0] / np.linalg.norm(before[0]))
+
+
+def test_a_device_with_two_ranges_changes_what_is_large_alone() -> None:
+    bench = _ideal("five")
+    before, s = _samples(bench).acc, _made("ranges by itself", bench).samples.acc
+    changed = np.abs(s - before) > 0
+    assert 0 < np.abs(before[changed]).min() / 9.80665 < 0.9
+    assert np.abs(before[changed]).min() > np.abs(before[~changed]).max()
+
+
+def test_a_device_that_calibrates_itself_is_at_last_what_it_was_drawn() -> None:
+    bench = _ideal("five")
+    before, after = _samples(bench), _made("calibrates itself", bench).samples
+    first, last = bench.windows[0], bench.windows[-1]
+    for name in ("acc", "gyr"):
+        off = np.abs(getattr(after, name) - getattr(before, name)).max(axis=1)
+        assert off[before.within(*first)].min() > 1e-5
+        assert off[before.within(*last)].max() == 0.0
+
+
+def test_a_device_askew_feels_the_same_force_in_other_axes() -> None:
+    bench = _ideal("five")
+    straight = _means(bench, _samples(bench))
+    spoiled = spoilt(bench, ("fastened askew",), np.random.default_rng(5))
+    askew = _means(bench, _samples(spoiled))
+    sizes = np.linalg.norm(straight, axis=1)
+    assert np.linalg.norm(askew, axis=1) == pytest.approx(sizes)
+    turn, off = Rotation.align_vectors(askew, straight)
+    assert np.deg2rad(0.1) < turn.magnitude() < np.deg2rad(5.0) and off < 1e-5
+
+
+def test_angles_that_are_read_coarsely_are_off_by_half_a_step_at_most() -> None:
+    bench = spoilt(_ideal("wide"), ("angles read coarsely",), np.random.default_rng(3))
+    assert 0 < np.abs(np.rad2deg(bench.off)).max() <= 0.5

@@ -109,8 +109,8 @@ GROUPED = {
         "sampled and held", "packets out of order", "sensors on two clocks",
         "clock set", "few significant digits",
     ),
-    "gravity's direction alone, ranges or calibrations that change": (
-        "gravity's direction alone", "ranges by itself", "calibrates itself",
+    "gravity's direction alone; a device that calibrates itself": (
+        "gravity's direction alone", "calibrates itself",
     ),
     "two days, two devices or two mountings in one": (
         "two days joined", "device exchanged", "device remounted",

@@ -21,18 +21,6 @@ def gravity_direction(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, acc=STANDARD * smooth / size))
 
 
-def ranges_itself(written: Written, bench: Bench, rng: Rng) -> Written:
-    """Beyond 0.3 to 0.9 g another range, with its own scale factor and offset, is used.
-
-    They differ by 0.03 to 1 %, and by 0.2 to 5 mg.
-    """
-    s, bar = written.samples, rng.uniform(0.3, 0.9) * STANDARD
-    scale = 1 + rng.normal(0, log_uniform(rng, 3e-4, 1e-2), 3)
-    offset = rng.normal(0, log_uniform(rng, 2e-3, 5e-2), 3)
-    acc = np.where(np.abs(s.acc) > bar, s.acc * scale + offset, s.acc)
-    return replace(written, samples=replace(s, acc=acc))
-
-
 def calibrates_itself(written: Written, bench: Bench, rng: Rng) -> Written:
     """At some instant the device begins to use another calibration of its own.
 
@@ -50,6 +38,5 @@ def calibrates_itself(written: Written, bench: Bench, rng: Rng) -> Written:
 
 OF_FIRMWARE: dict[str, After] = {
     "gravity's direction alone": gravity_direction,
-    "ranges by itself": ranges_itself,
     "calibrates itself": calibrates_itself,
 }

@@ -29,6 +29,7 @@ from fieldcal.physics.grid_stretches import (
 )
 from fieldcal.physics.recording import Grids
 from fieldcal.session.description import Description
+from fieldcal.session.direction_alone import refuse_direction_alone
 from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 from fieldcal.session.folder import Session
 from fieldcal.session.mixed_devices import refuse_mixed_devices
@@ -77,7 +78,8 @@ def usable_windows(session: Session) -> UsableWindows:
     SessionError
         If it has no position, or no window of any position can be used.
     InputError
-        If windows overlap, a channel is another's copy, or samples are of two devices.
+        If windows overlap, a channel is another's copy, accelerations are a direction,
+        or samples are of two devices.
 
     """
     if not session.positions:
@@ -89,6 +91,7 @@ def usable_windows(session: Session) -> UsableWindows:
     if session.about.means_only:
         return _windows_of_means(session)
     refuse_duplicate_channels(session.block)
+    refuse_direction_alone(session.block, session.about.windows)
     refuse_mixed_devices(session.block, session.about.windows)
     dead, warnings = dead_sensors(session.block.six), list(session.warnings)
     taken = _average_windows(session, _without_dead_axes(session.block), warnings)

@@ -243,14 +243,6 @@ def test_a_direction_of_gravity_has_no_scale_factor_and_no_bias() -> None:
     assert seen[0] / 9.80665 == pytest.approx(before[0] / np.linalg.norm(before[0]))
 
 
-def test_a_device_with_two_ranges_changes_what_is_large_alone() -> None:
-    bench = _ideal("five")
-    before, s = _samples(bench).acc, _made("ranges by itself", bench).samples.acc
-    changed = np.abs(s - before) > 0
-    assert 0 < np.abs(before[changed]).min() / 9.80665 < 0.9
-    assert np.abs(before[changed]).min() > np.abs(before[~changed]).max()
-
-
 def test_a_device_that_calibrates_itself_is_at_last_what_it_was_drawn() -> None:
     bench = _ideal("five")
     before, after = _samples(bench), _made("calibrates itself", bench).samples

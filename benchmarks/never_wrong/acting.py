@@ -92,6 +92,14 @@ class Acting:
         f, w = (_turned_by(-size * share, axis, v) for v in (f, w))
         return f, w + size * speed[:, None] * axis
 
+    @property
+    def askew(self) -> Floats | None:
+        """How a device that slipped before the recording is turned, (3, 3)."""
+        size = float(np.linalg.norm(self.slips))
+        if not size or self.slip_s >= 0:
+            return None
+        return _turned_by(np.full(3, -size), np.array(self.slips) / size, np.eye(3)).T
+
     def _acts(self, t: Floats) -> tuple[Floats, Floats]:
         """How much vibration and sway act, 0 to 1, and its rate, 1/s, (n,) each."""
         if not self.spans:

@@ -138,6 +138,9 @@ class Bench:
         come = self.device.come_to(float(self.windows[-1, 1]))
         groups = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
         found = {g: getattr(self, g) + come.get(g, 0.0) for g in groups}
+        if (turned := self.acting.askew) is not None:  # a matrix in the fixture's axes
+            gyr = (np.diag(found["gyr_scale"]) + self.device.coupled[1]) @ turned
+            found["gyr_scale"] = np.diag(gyr)
         if not self.stated:
             acc, gyr = self.device.coupled
             upper, axes = own_axes(np.diag(found["acc_scale"]) + acc)

@@ -151,9 +151,9 @@ def slipping(bench: Bench, rng: Rng) -> Bench:
 
 
 def crooked(bench: Bench, rng: Rng) -> Bench:
-    """The device is fastened 0.1 to 5 degrees askew."""
+    """The device is fastened 0.1 to 2 degrees askew."""
     axis = rng.normal(size=3)
-    size = np.deg2rad(log_uniform(rng, 0.1, 5.0)) / np.linalg.norm(axis)
+    size = np.deg2rad(log_uniform(rng, 0.1, 2.0)) / np.linalg.norm(axis)
     x, y, z = (size * axis).tolist()
     return acting(bench, slips=(x, y, z), slip_s=-10.0)
 

@@ -22,7 +22,7 @@ from fieldcal.physics.experience import Experience
 class BiasDrift(BiasChange):
     """Linear change of the biases."""
 
-    thermal = True
+    with_scales = True
     params = six("m/s^2/s", 1e-4, "rad/s/s", 5e-6)
     covariate = "time"
     seen_in = "time"

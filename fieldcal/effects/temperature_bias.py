@@ -23,7 +23,7 @@ from fieldcal.physics.experience import Experience
 class TemperatureBias(BiasChange):
     """Temperature coefficient of the biases."""
 
-    thermal = True
+    with_scales = True
     params = six("m/s^2/K", 1.5e-2, "rad/s/K", 5e-4)
     covariate = "temperature"
     seen_in = "temperature"

@@ -23,7 +23,7 @@ from fieldcal.physics.experience import Experience
 class ThermalHysteresis(BiasChange):
     """Response of the biases to the rate of the temperature."""
 
-    thermal = True
+    with_scales = True
     params = six("m/s^2/(K/s)", 1.0, "rad/s/(K/s)", 2e-2)
     covariate = "rate of the temperature"
     seen_in = "temperature"

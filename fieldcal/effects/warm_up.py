@@ -26,7 +26,7 @@ from fieldcal.physics.shape import Shape
 class WarmUp(BiasChange):
     """Exponential change of the biases since power-on."""
 
-    thermal = True
+    with_scales = True
     params = six("m/s^2", 5e-2, "rad/s", 2e-3)
     shapes = (Shape("tau_s", "s", 30.0, 4000.0, "session"),)
     covariate = "time since the start"

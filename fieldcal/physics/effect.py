@@ -220,11 +220,11 @@ class Separable(Sensor):
 class BiasChange(Separable):
     """An effect that adds one course to every output, each by a parameter of its own.
 
-    Parameters are those of `six`. `thermal` says that it is the temperature that does
-    so, and scale factors then change as well.
+    Parameters are those of `six`. `with_scales` says that scale factors change as well,
+    as they do with the temperature and when a device restarts.
     """
 
-    thermal: ClassVar[bool] = False
+    with_scales: ClassVar[bool] = False
 
     def pattern(self, x: Experience) -> Array:
         """One on each output, by its own parameter."""

@@ -102,7 +102,26 @@ def _parameters_at_end(
     """Parameters of an explanation at the end of the recording (`end_values`)."""
     picked = parameter_matrix(parameter_set, mixture.columns)
     before = _nominal_values(parameter_set, nominal)
-    return before + picked @ mixture.mean, picked @ mixture.covariance @ picked.T
+    askew = _askew_variance(parameter_set, mixture)
+    covariance = picked @ mixture.covariance @ picked.T + np.diag(askew)
+    return before + picked @ mixture.mean, covariance
+
+
+def _askew_variance(parameter_set: ParameterSet, mixture: Mixture) -> Array:
+    """Variance of scale factors from what an axis sees across its own, (k,).
+
+    The recording shows scale factors along the axes of the fixture, k, and couplings
+    k_j that the calibration does not contain. Along its own axis an output has
+
+        sqrt(k^2 + sum k_j^2)  =  k + sum k_j^2 / 2 k                              (2)
+
+    which is more if the device is fastened askew. What is wanted is not known.
+    """
+    values = np.zeros(parameter_set.width)
+    values[mixture.columns] = mixture.mean
+    more = 0.5 * (parameter_set.end_values.coupling(values) ** 2).sum(axis=1)  # (2)
+    names = [ParameterName.of(name) for name in parameter_set.names]
+    return np.array([more[n.channel] ** 2 if n.is_scale else 0.0 for n in names])
 
 
 def parameter_matrix(parameter_set: ParameterSet, columns: Index) -> Array:
@@ -114,7 +133,7 @@ def parameter_matrix(parameter_set: ParameterSet, columns: Index) -> Array:
         parameter = ParameterName.of(name)
         if parameter.sensor:
             scale, c = parameter.is_scale, parameter.channel
-            picked[i] += parameter_set.bias_scale_at_end[int(scale)][c, columns]
+            picked[i] += parameter_set.end_values.bias_scale[int(scale)][c, columns]
     return picked
 
 

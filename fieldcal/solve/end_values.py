@@ -10,7 +10,7 @@ instant,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,13 +32,37 @@ DERIVATIVE_STEP = 1e-3
 """d of (1), m/s^2 and rad/s."""
 
 
-def bias_scale_at_end(d: Dictionary, shown: Sequence[WeightedExplanation]) -> Array:
-    """Derivative of biases and scale factors at the end by the columns of `d`, (1).
+@dataclass(frozen=True, slots=True)
+class EndValues:
+    """Derivatives of the outputs at the end of a recording by k columns.
 
-    Returns (2, 6, k): biases and scale factors, by output and column. Columns that do
-    not belong to the explanations have 0.
+    Attributes
+    ----------
+    bias : (6, k) of the outputs without force and rate
+    slopes : (6, 6, k) of the slope of an output by an input of f and w, (1)
+
     """
-    out = np.zeros((2, 6, d.width))
+
+    bias: Array
+    slopes: Array
+
+    @property
+    def bias_scale(self) -> Array:
+        """Of biases and of scale factors, (2, 6, k)."""
+        return np.stack([self.bias, self.slopes[range(6), range(6)]])
+
+    def coupling(self, values: Array) -> Array:
+        """Slopes by the other axes of a triad, (6, 6), for values (k,)."""
+        same = np.kron(np.eye(2), np.ones((3, 3)) - np.eye(3))
+        found: Array = same * (self.slopes @ values)
+        return found
+
+
+def end_values(d: Dictionary, shown: Sequence[WeightedExplanation]) -> EndValues:
+    """Biases, scale factors and couplings at the end by the columns of `d`.
+
+    Columns that do not belong to the explanations have 0.
+    """
     changing = np.zeros(d.width, dtype=bool)
     for explanation in shown:
         for cause, group in (*explanation.members, *explanation.possible_members):
@@ -47,14 +71,14 @@ def bias_scale_at_end(d: Dictionary, shown: Sequence[WeightedExplanation]) -> Ar
             ):
                 for each in cause.variants if has_equation(group) else (group,):
                     changing[each.columns] = True
+    slopes = np.zeros((6, 6, d.width))
     if not changing.any():
-        return out
-    out[0] = _end_outputs(d, changing, np.zeros(6))
+        return EndValues(slopes[0], slopes)
     for c in range(6):
         step = DERIVATIVE_STEP * np.eye(6)[c]
-        up, down = (_end_outputs(d, changing, s * step)[c] for s in (1.0, -1.0))
-        out[1, c] = (up - down) / (2 * DERIVATIVE_STEP)
-    return out
+        up, down = (_end_outputs(d, changing, s * step) for s in (1.0, -1.0))
+        slopes[:, c] = (up - down) / (2 * DERIVATIVE_STEP)  # (1)
+    return EndValues(_end_outputs(d, changing, np.zeros(6)), slopes)
 
 
 def _end_outputs(d: Dictionary, changing: Array, felt: Array) -> Array:

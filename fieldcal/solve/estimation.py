@@ -32,7 +32,7 @@ from fieldcal.solve.averaging import (
     parameter_matrix,
     select_determined,
 )
-from fieldcal.solve.end_values import bias_scale_at_end
+from fieldcal.solve.end_values import end_values
 from fieldcal.solve.explanations import WeightedExplanation
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
@@ -182,9 +182,8 @@ class ParameterEstimate:
     @property
     def valid_at_s(self) -> float | None:
         """Time for which changing biases are stated, s since the start; or None."""
-        if not bias_scale_at_end(
-            self.parameter_set, self.parameter_set.explanations
-        ).any():
+        shown = end_values(self.parameter_set, self.parameter_set.explanations)
+        if not shown.bias_scale.any():
             return None
         x = self.parameter_set.x
         return float((x.since_start + x.lasts / 2).max())

@@ -29,7 +29,7 @@ from fieldcal.model.causes.factory_groups import factory_groups
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.averages import Rows
-from fieldcal.solve.end_values import bias_scale_at_end
+from fieldcal.solve.end_values import EndValues, end_values
 from fieldcal.solve.explanations import WeightedExplanation, translate_explanations
 from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
@@ -132,17 +132,15 @@ class ParameterSet(Dictionary):
         return (*self.base_members, *carried, *warm)
 
     @cached_property
-    def bias_scale_at_end(self) -> Array:
-        """Derivative of final biases and scale factors by the columns, (2, 6, k)."""
+    def end_values(self) -> EndValues:
+        """Derivative of final biases and scale factors by the columns."""
         known = (*self.base_members, *self._warm.values())
         left = tuple(
             (cause, group)
             for cause, group in known
             if cause.name == WARM_SCALE or group.part in WARMING_EFFECTS
         )
-        return bias_scale_at_end(
-            self, (WeightedExplanation(left, 1.0), *self.explanations)
-        )
+        return end_values(self, (WeightedExplanation(left, 1.0), *self.explanations))
 
     @property
     def groups(self) -> list[Group]:

@@ -2,12 +2,13 @@
 
     U_i += sum_k s_ik c_k(t) f_i,   s_ik = N(0, (r b_k / g)^2)                     (1)
 
-c_k(t) are the courses by which the temperature changes the biases, b_k the sizes of
-these changes, and r the change of a scale factor at 1 g as a part of that of a bias.
-Positions that are taken once cannot distinguish (1) from constant scale factors, but
-the next flight starts with the changed ones. The MPU-6050 states 0.02 %/K, and 35 mg
-from 25 to 70 degC, which is r = 0.25. A smooth course of biases that no effect
-describes is attributed to the temperature, the most frequent cause.
+c_k(t) are the courses by which the biases change, b_k the sizes of these changes, and r
+the change of a scale factor at 1 g as a part of that of a bias. Positions that are
+taken once cannot distinguish (1) from constant scale factors, but the next flight
+starts with the changed ones. For the temperature, the MPU-6050 states 0.02 %/K, and 35
+mg from 25 to 70 degC, which is r = 0.25. A smooth course of biases that no effect
+describes is attributed to it, the most frequent cause. A restart, another range or a
+calibration by the device itself changes both at once, by sizes that are as alike.
 """
 
 from __future__ import annotations
@@ -39,11 +40,11 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
     Parameters
     ----------
     table : to which the columns are added
-    group : the result is None unless the group may be an effect of the temperature and
-        is on accelerometers
+    group : the result is None unless scale factors change with the biases that it
+        changes, and it is on accelerometers
 
     """
-    if not _thermal(group):
+    if not _changes_scales(group):
         return None
     course, which, size = _courses(table, group)
     if not len(which):
@@ -66,12 +67,12 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
     return Cause(WARM_SCALE, "", 1.0, (one,), "noise"), one
 
 
-def _thermal(group: Group) -> bool:
-    """Whether a group may be an effect of the temperature."""
+def _changes_scales(group: Group) -> bool:
+    """Whether what changes biases changes scale factors as well."""
     effect = group.effect
     if effect is None:
         return group.cause in COURSES
-    return isinstance(effect, BiasChange) and effect.thermal
+    return isinstance(effect, BiasChange) and effect.with_scales
 
 
 def _courses(table: ColumnTable, group: Group) -> tuple[Course, Index, Array]:

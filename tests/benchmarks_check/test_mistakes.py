@@ -261,7 +261,7 @@ def test_a_device_askew_feels_the_same_force_in_other_axes() -> None:
     sizes = np.linalg.norm(straight, axis=1)
     assert np.linalg.norm(askew, axis=1) == pytest.approx(sizes)
     turn, off = Rotation.align_vectors(askew, straight)
-    assert np.deg2rad(0.1) < turn.magnitude() < np.deg2rad(5.0) and off < 1e-5
+    assert np.deg2rad(0.1) < turn.magnitude() < np.deg2rad(2.0) and off < 1e-5
 
 
 def test_angles_that_are_read_coarsely_are_off_by_half_a_step_at_most() -> None:

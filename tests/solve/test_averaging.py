@@ -20,6 +20,7 @@ from fieldcal.solve.averaging import (
     parameter_matrix,
     select_determined,
 )
+from fieldcal.solve.end_values import EndValues
 
 NAMES = ("acc_bias.x", "gyr_scale.z", "base_tilt.about_x_deg")
 AT = {"acc_bias.x": 2, "gyr_scale.z": 4, "base_tilt.about_x_deg": 1}
@@ -28,14 +29,15 @@ WIDTH = 6
 
 def made_set(turned: bool = False, prior: float = 10.0) -> Any:
     """A set of three parameters in six columns, whose bias drifts with column 5."""
-    at_end = np.zeros((2, 6, WIDTH))
-    at_end[0, 0, 5], at_end[1, 5, 5], at_end[1, 0, 5] = 7.0, 0.5, 99.0
+    bias, slopes = np.zeros((6, WIDTH)), np.zeros((6, 6, WIDTH))
+    bias[0, 5], slopes[5, 5, 5], slopes[0, 0, 5] = 7.0, 0.5, 99.0
+    slopes[5, 3, 3], slopes[5, 1, 3], slopes[3, 5, 3] = 0.2, 8.0, 9.0
 
     wide = np.full(WIDTH, prior)
     group = Group("bias", "acc", np.arange(WIDTH), wide, fixed_size=2.0)
     return SimpleNamespace(
         names=NAMES, column_by_name=AT, width=WIDTH, groups=[group],
-        bias_scale_at_end=at_end, options=SimpleNamespace(turned=turned),
+        end_values=EndValues(bias, slopes), options=SimpleNamespace(turned=turned),
     )  # fmt: skip
 
 
@@ -45,6 +47,17 @@ def test_parameters_are_their_columns_and_what_drifts_until_the_end() -> None:
         parameter_matrix(made_set(), columns),
         [[7.0, 0, 1, 0, 0], [0.5, 1, 0, 0, 0], [0, 0, 0, 1, 0]],
     )
+
+
+def test_a_scale_factor_may_be_along_another_axis_than_the_fixtures() -> None:
+    """A gyroscope sees 0.2 times 0.3 of the rate about x; forces do not count."""
+    mixture: Any = SimpleNamespace(
+        columns=np.array([3, 4]), mean=np.array([0.3, 1.0]), covariance=np.eye(2)
+    )
+    more = averaging._askew_variance(made_set(), mixture)
+    along = np.linalg.norm([1.0, 0.2 * 0.3])
+    assert np.sqrt(more[1]) == pytest.approx(along - 1.0, rel=1e-3)
+    assert more[[0, 2]].tolist() == [0.0, 0.0]
 
 
 def test_nominal_values_are_those_of_the_sensors() -> None:

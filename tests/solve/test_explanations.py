@@ -233,7 +233,7 @@ def test_functions_without_physics_are_carried_by_their_place() -> None:
     ((same, group),) = shown.explanations[0].members
     assert same.key == "time:ay" and group.shape == cause.variants[2].shape
     assert same.kind == "unknown"
-    ends = shown.bias_scale_at_end[0]
+    ends = shown.end_values.bias
     assert np.flatnonzero(ends.any(axis=1)).tolist() == [1]
     expected = (-1.0) ** np.arange(1, len(group.columns) + 1)
     np.testing.assert_allclose(ends[1, group.columns], expected)
@@ -245,7 +245,7 @@ def test_a_scale_factor_that_changes_has_its_value_at_the_end() -> None:
     cause = next(c for c in unknown_causes(d) if c.key == "force and time:ax")
     shown = given([WeightedExplanation(((cause, cause.variants[1]),), 1.0)])
     ((_, group),) = shown.explanations[0].members
-    bias, scale = shown.bias_scale_at_end
+    bias, scale = shown.end_values.bias_scale
     assert not bias.any()
     np.testing.assert_allclose(scale[0, group.columns], 1 / 9.81, rtol=1e-6)
     assert np.count_nonzero(scale) == len(group.columns)
@@ -265,7 +265,7 @@ def test_the_bias_is_that_at_the_end() -> None:
     """Of a drift, what it has come to, and what scale factors have beside it."""
     d = given([WeightedExplanation((member("bias_drift"),), 1.0)])
     ((_, group),) = d.explanations[0].members
-    bias, scale = d.bias_scale_at_end
+    bias, scale = d.end_values.bias_scale
     for j, column in zip(group.params, group.columns, strict=True):
         assert bias[j, column] == pytest.approx(TIMES[-1])
     assert np.count_nonzero(bias) == len(group.params)
@@ -282,7 +282,7 @@ def test_a_walk_ends_where_its_cosines_do() -> None:
     d = given([WeightedExplanation((member("random_walk"),), 1.0)])
     ((_, group),) = d.explanations[0].members
     channel = group.params[0]
-    ends = d.bias_scale_at_end[0][channel, group.columns]
+    ends = d.end_values.bias[channel, group.columns]
     own = ends[ends != 0.0]
     assert own[:4] == pytest.approx([-1.0, 1.0, -1.0, 1.0])
 

@@ -100,23 +100,23 @@ def test_columns_are_the_course_times_the_force_and_as_large_as_the_biases() -> 
 
 
 @pytest.mark.parametrize(
-    ("name", "thermal"),
+    ("name", "changes"),
     [
         ("warm_up", True),
         ("bias_drift", True),
         ("temperature_bias", True),
         ("thermal_hysteresis", True),
         ("settling", False),
-        ("bias_step", False),
+        ("bias_step", True),
     ],
 )
-def test_what_changes_scale_factors_is_the_temperature(
-    name: str, thermal: bool
+def test_the_temperature_and_restarts_change_scale_factors(
+    name: str, changes: bool
 ) -> None:
     effect = catalogue()[name]
     d = given()
     group = replace(drift(d)[1], effect=effect)
-    assert (warm_scale(d, group) is not None) == thermal
+    assert (warm_scale(d, group) is not None) == changes
 
 
 def test_nothing_comes_of_gyroscopes_or_of_what_is_no_bias() -> None:

@@ -22,6 +22,10 @@ from fieldcal.session.description import Description
 DEG_H = math.radians(1) / 3600
 """rad/s of one degree an hour."""
 
+BEYOND, CERTAIN = 5.0, 3.0
+"""Times the usual cross-coupling that no factory leaves, and standard deviations by
+which it must be exceeded."""
+
 SourceOfSize = Callable[..., str]
 """From the name of an error, and the size that is stated for it, to who says it."""
 
@@ -61,10 +65,29 @@ def _factory_checks(
         return of_grade if size == by_grade else "as the recording shows"
 
     if "acc" in measured:
+        yield from _coupling_check(calibration, left)
         yield from _accelerometer_checks(left, about, whose)
     if "gyr" in measured:
         yield from _gyroscope_checks(left, about, whose)
     yield from _warm_up_check(left, measured, whose)
+
+
+def _coupling_check(calibration: Calibration, left: FactoryErrors) -> Iterator[Check]:
+    """NO-GO if the calibration lacks more cross-coupling than it relies on."""
+    shown = calibration.info.get("coupling_left_out")
+    if not shown:
+        return
+    size = abs(shown["value"])
+    if size - CERTAIN * shown["sigma"] > BEYOND * left.cross_coupling:
+        says = (
+            f"accelerometer {shown['axis']} feels {100 * size:.2g} ±"
+            f" {100 * shown['sigma']:.1g} % of the force along {shown['of']}, which is"
+            f" {G0 * size:.2g} m/s² at 1 g and not in this calibration: the device is"
+            f" fastened askew, by about {math.degrees(size):.2g}°, or its axes are not"
+            " square; fasten it straight and record again, or estimate cross-coupling"
+            " (--cross)"
+        )
+        yield Check("cross-coupling", False, says)
 
 
 def _accelerometer_checks(

@@ -14,6 +14,7 @@ from fieldcal.calibration.plausible import implausible_values, misdirected_turns
 from fieldcal.core.errors import NotObservable
 from fieldcal.model import thresholds
 from fieldcal.solve import words
+from fieldcal.solve.coupling_left_out import largest_coupling_left_out
 from fieldcal.solve.cross_coupling_effect import largest_cross_coupling_effect
 from fieldcal.solve.doubtful_position import DoubtfulPosition
 from fieldcal.solve.estimation import ParameterEstimate, closure_scatter, window_scatter
@@ -168,6 +169,8 @@ def _info(
         out["wrong_angles"] = [w.to_json() for w in harmful]
     if estimate.causes or estimate.valid_at_s is not None:
         out["carried"] = _carried_info(observations, estimate)
+    if coupling := largest_coupling_left_out(estimate):
+        out["coupling_left_out"] = coupling.to_json()
     if estimate.turn_rows:
         chi2, dof = closure_chi2(estimate)
         scatter = closure_scatter(estimate.mixture)

@@ -288,3 +288,39 @@ def test_a_device_beyond_its_grade_has_of_each_kind_what_the_recording_shows(
     by_name = {check.name: check.says for check in told}
     for name in ("linearity", "hysteresis", "warm-up"):
         assert says in by_name[name]
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "square", "fails"),
+    [
+        (-0.02, 1e-4, 1e-3, True),
+        (0.02, 6e-3, 1e-3, False),
+        (0.004, 1e-4, 1e-3, False),
+        (-0.02, 1e-4, 1e-2, False),
+    ],
+)
+def test_a_device_askew_contradicts_the_axes_that_a_result_relies_on(
+    value: float, sigma: float, square: float, fails: bool
+) -> None:
+    shown = {"axis": "y", "of": "z", "value": value, "sigma": sigma}
+    calibration = found(square)
+    more = {**calibration.info, "coupling_left_out": shown}
+    checks = check_factory_errors(replace(calibration, info=more), ABOUT, TACTICAL)
+    failed = [c for c in checks if c.ok is False]
+    assert bool(failed) == fails
+    for one in failed:
+        assert "accelerometer y feels 2 ± 0.01 % of the force along z" in one.says
+        assert "by about 1.1°" in one.says and "--cross" in one.says
+
+
+def test_a_result_with_cross_coupling_leaves_none_out() -> None:
+    """A device that is turned by 2 degrees in nine positions."""
+    turn = np.deg2rad(2.0)
+    turned = np.array(
+        [[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+    )
+    seen = observe(NINE, specific_forces(NINE, G) @ turned.T, sigma=1e-4)
+    left = solve(seen, tilt="none", factory=FactoryErrors(1e-3)).info
+    assert "coupling_left_out" not in left  # means alone are not examined
+    whole = solve(seen, tilt="none", cross=True, factory=FactoryErrors(1e-3))
+    assert whole.value("cross_coupling.k12") == pytest.approx(np.sin(turn), abs=1e-3)

@@ -14,6 +14,8 @@ from fieldcal.core.errors import NotObservable
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.solve import result, solve
+from fieldcal.solve.coupling_left_out import largest_coupling_left_out
+from fieldcal.solve.end_values import EndValues
 from fieldcal.solve.estimation import ParameterEstimate
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.options import SolveOptions
@@ -34,13 +36,17 @@ def estimated(**known: Any) -> ParameterEstimate:
         factory=FactoryErrors(),
     )  # fmt: skip
     given = SimpleNamespace(
-        options=options, unoriented=np.zeros(5, dtype=bool), names=("acc_bias.x",)
-    )
+        options=options, unoriented=np.zeros(5, dtype=bool), names=("acc_bias.x",),
+        width=1, end_values=EndValues(np.zeros((6, 1)), np.zeros((6, 6, 1))),
+    )  # fmt: skip
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "undetermined": (), "parameter_set": given,
         "acc": fit(), "score": -12.5, "valid_at_s": None,
         "gyr": fit(rms=np.nan), "closure_squares": (0.0, 0),
-        "mixture": SimpleNamespace(scatter=np.array([3, 4, 0, 2, 1, 0, 5.0])),
+        "mixture": SimpleNamespace(
+            scatter=np.array([3, 4, 0, 2, 1, 0, 5.0]),
+            columns=np.array([0]), mean=np.ones(1), covariance=np.eye(1),
+        ),
     }  # fmt: skip
     return cast(ParameterEstimate, SimpleNamespace(**(nothing | known)))
 
@@ -279,3 +285,18 @@ def test_without_accelerometers_the_gyroscopes_are_what_agrees() -> None:
                   covariance=np.array([[1e-10]]), shift_sigmas=np.zeros(1))  # fmt: skip
     made = result.build_calibration("joint", observed(), SolveOptions(), found, [])
     assert made.chi2 == 5.0
+
+
+def test_the_largest_coupling_that_is_left_out_has_its_axes_and_uncertainty() -> None:
+    found = estimated()
+    slopes = found.parameter_set.end_values.slopes
+    slopes[1, 2, 0], slopes[0, 1, 0] = -0.03, 0.02
+    slopes[0, 0, 0], slopes[1, 4, 0], slopes[3, 4, 0] = 1.0, 0.5, 0.5
+    shown = largest_coupling_left_out(found)
+    assert shown is not None
+    assert shown.to_json() == {
+        "axis": "y", "of": "z", "value": pytest.approx(-0.03),
+        "sigma": pytest.approx(0.03),
+    }  # fmt: skip
+    slopes[1, 2, 0] = slopes[0, 1, 0] = 0.0
+    assert largest_coupling_left_out(found) is None

@@ -184,10 +184,15 @@ def main() -> None:
 def draw_and_judge(
     seed: int, options: Options, names: tuple[str, ...] | None = None
 ) -> tuple[Bench, tuple[str, ...], Judged]:
-    """One session, its mistakes, drawn unless they are `names`, and what was said."""
+    """One session, its mistakes, and what was said.
+
+    They are drawn even if they are `names`, so that a session of a campaign of all
+    mistakes remains the same if others are added to them.
+    """
     rng = np.random.default_rng(seed)
     bench = drawn(rng)
-    names = mistakes(seed, rng, options.only) if names is None else names
+    own = mistakes(seed, rng, options.only)
+    names = own if names is None else names
     bench = spoilt(bench, names, rng)
     with tempfile.TemporaryDirectory() as where:
         folder = Path(where) / "session"

@@ -4,6 +4,7 @@ x 0.1 y 0.2 z 9.8                  x: 0.1 y: 0.2 z: 9.8
 accel x,y,z: 0.1, 0.2, 9.8         accel x: 0.1 y: 0.2 z: 9.8
 (ax, ay, az) = (0.1, 0.2, 9.8)     ax: 0.1 ay: 0.2 az: 9.8
 acc_xyz: 0.1, 0.2, 9.8             acc: 0.1, 0.2, 9.8
+accel 0.1 0.2 9.8 m/s/s            accel: 0.1 0.2 9.8 m/s/s
 ax: 0.1 (m/s²) ay: 0.2 (m/s²)      ax: 0.1 m/s², ay: 0.2 m/s²,
 accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}       Acc (mg) [ 10.1, -2.3, 999.1 ]
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 import re
 
 from fieldcal.importing.text.repeated_lines import NUMBER
-from fieldcal.importing.words.heading_units import parse_unit
+from fieldcal.importing.words.heading_units import THERMOMETERS, parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.importing.words.sensor_words import AXES
 
@@ -60,6 +61,14 @@ _PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{NUMBER}[\s,;|]*){{3,}}")
 _PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={NUMBER})")
 """Labels with a space before their value, where a line holds nothing else."""
 
+_THREE = re.compile(
+    rf"(\s*[A-Za-z_]\w*)\s+({NUMBER}\s+{NUMBER}\s+{NUMBER})\s+(\D+?)\s*"
+)
+"""A label with three values and their unit, where a line holds nothing else."""
+
+_UNNAMED = re.compile(rf"\s*({NUMBER})\s*(\D+?)\s*")
+"""A value with its unit alone in a line."""
+
 _ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({NUMBER}\D*)")
 """A label with its value alone in a line, as programs print a temperature."""
 
@@ -79,6 +88,10 @@ def plain_labels(line: str) -> str:
     line = _BEHIND.sub(_bare_unit, line)
     line = _LISTED.sub(r"\1: \2", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
+    three = _THREE.fullmatch(line)
+    line = (
+        f"{three[1]}: {three[2]} {three[3]}" if three and parse_unit(three[3]) else line
+    )
     return _of_temperature(line)
 
 
@@ -93,6 +106,18 @@ def _pairs(said: re.Match[str]) -> str:
 def _bare_unit(said: re.Match[str]) -> str:
     """A value with its unit, and without what is none."""
     return f"{said[1]} {said[2] if parse_unit(said[2]) else ''}, "
+
+
+def name_temperature(line: str) -> str:
+    """A line that holds nothing but a temperature, with a label before it.
+
+    >>> name_temperature("27.3 Cel"), name_temperature("3 rows")
+    ('temperature: 27.3 Cel', '3 rows')
+    """
+    said = _UNNAMED.fullmatch(line)
+    if said is None or said[2].lower() not in THERMOMETERS:
+        return line
+    return f"temperature: {said[1]} {said[2]}"
 
 
 def _of_temperature(line: str) -> str:

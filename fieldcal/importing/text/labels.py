@@ -19,7 +19,11 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 
-from fieldcal.importing.text.label_spellings import MAX_UNIT_LETTERS, plain_labels
+from fieldcal.importing.text.label_spellings import (
+    MAX_UNIT_LETTERS,
+    name_temperature,
+    plain_labels,
+)
 from fieldcal.importing.text.log_prefixes import STAMP, TICKS, TIME, log_prefix
 from fieldcal.importing.text.repeated_lines import NUMBER
 from fieldcal.importing.words.heading_units import parse_unit
@@ -116,7 +120,7 @@ def named_values(line: str) -> tuple[str, list[Labelled]]:
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
     rest = LEVEL.sub("", rest, 1) if LEVEL.match(rest) else rest
-    name, split = _split_labels(rest)
+    name, split = _split_labels(name_temperature(rest))
     parts, values = [], []
     for label, text in split:
         said = _VALUES.fullmatch(text)

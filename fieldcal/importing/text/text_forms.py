@@ -9,6 +9,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     $IMU,0.01,0.1*5A                   lines with a checksum
     %RAWIMUSA,2209,4916.2;...*1fb76c28  messages of a receiver
     $VNYMR,-131.1,+31.8,...*62         messages of a device by VectorNav
+    channel idx=3 accel_xyz x = 0.1    channels of Zephyr's sensor shell
     0.01,0.1,0.2,9.8;                  lines with a mark at their end
     angular_velocity:\n  x: 0.1        messages as ROS shows them
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
@@ -57,6 +58,7 @@ from fieldcal.importing.text.text_lines import split_quoted
 from fieldcal.importing.text.text_top import find_separator, split_cells
 from fieldcal.importing.text.vectornav_lines import VectorNavLines
 from fieldcal.importing.text.written_numbers import FortranNumbers, UnitCells
+from fieldcal.importing.text.zephyr_lines import ZephyrLines
 from fieldcal.importing.times.clock_text import (
     IN_LINE,
     ClockText,
@@ -235,6 +237,7 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
+    ZephyrLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
     QuotedCells, PairedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, BarTable, ListCells,

@@ -7,7 +7,7 @@ import re
 SPELLINGS = {
     "m/s^2": ("m/s^2", "m/s2", "m/s²", "m/s/s", "m/s**2", "mps2", "m s-2", "ms-2",
               "m s^-2", "m/(s^2)", "m.s-2", "m.s^-2", "m/sec^2", "m/(sec^2)",
-              "m*s^-2", "ms^-2", "m/sec2", "m/sec²",
+              "m*s^-2", "ms^-2", "ms/2", "m/sec2", "m/sec²",
               "meters/sec2", "meters/sec^2", "meters/s^2"),
     "mm/s^2": ("mm/s^2", "mm/s2", "mm/s²", "mmps2"),
     "cm/s^2": ("cm/s^2", "cm/s2", "cm/s²", "gal"),
@@ -33,7 +33,7 @@ SPELLINGS = {
     "min": ("min", "mins", "minute", "minutes"),
     "h": ("h", "hrs"),
     "deg C": ("c", "°c", "°", "'c", "degc", "deg c", "celsius", "℃", "degrees c",
-              "deg.c", "ºc"),
+              "deg.c", "ºc", "cel"),
     "K": ("kelvin", "degk", "deg k"),
     "deg F": ("°f", "degf", "deg f", "fahrenheit", "℉", "degrees f", "ºf"),
 }  # fmt: skip
@@ -46,7 +46,7 @@ TEMPERATURES = {"deg C": "degC", "K": "K", "deg F": "degF"}
 """Units of temperatures, and what ``--temp-unit`` calls them."""
 
 THERMOMETERS = (*SPELLINGS["K"], *SPELLINGS["deg F"], "°c", "degc", "deg c", "celsius",
-                "℃", "degrees c", "deg.c", "ºc")  # fmt: skip
+                "℃", "degrees c", "deg.c", "ºc", "cel")  # fmt: skip
 """Units that tell a thermometer, whatever it is called: a lone c or ° may be any."""
 
 HALF_ANGLE = "half rad"

@@ -6,6 +6,8 @@ of an effect are in its own file.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from fieldcal.core.samples import Array
@@ -168,3 +170,10 @@ def density(tail: float = SIZE_TAIL) -> Array:
     weight = 1 / (1 + SIZES**tail)
     share: Array = weight / weight.sum()
     return share
+
+
+@cache
+def log_density(tail: float = SIZE_TAIL) -> Array:
+    """Log prior of each of `SIZES`."""
+    out: Array = np.log(density(tail))
+    return out

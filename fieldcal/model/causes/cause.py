@@ -68,6 +68,7 @@ class Group:
     fixed_size : v, if it is known; None if it is estimated
     random : whether it is a random process: it is not subtracted from residuals and
         not used for predictions
+    size_tail : how the prior of its size falls, as `priors.SIZE_TAIL`
 
     """
 
@@ -86,6 +87,12 @@ class Group:
     shape_sigma: float = np.nan
     fixed_size: float | None = None
     random: bool = False
+    size_tail: float = priors.SIZE_TAIL
+
+    @property
+    def log_density(self) -> Array:
+        """Log prior of each of `priors.SIZES`."""
+        return priors.log_density(self.size_tail)
 
     @property
     def names(self) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -132,11 +133,15 @@ def _cosine_flicker(table: ColumnTable) -> Iterator[Group]:
 
 
 def series_flicker(table: ColumnTable, series: FlickerSeries) -> Iterator[Group]:
-    """Flicker of each triad as a series, for few windows without other instability."""
+    """Flicker of each triad as a series, for few windows without other instability.
+
+    It stands for the instability, and is no larger.
+    """
     many = len(series.sizes)
     at = table.add_course("flicker", lambda x: series.at(x.t), many, True)
     terms = list(at.reshape(6, many))
-    yield from _flicker_groups(table, terms, series.sizes, priors.INSTABILITY)
+    for group in _flicker_groups(table, terms, series.sizes, priors.INSTABILITY):
+        yield replace(group, size_tail=priors.INSTABILITY_TAIL)
 
 
 def _flicker_groups(

@@ -24,8 +24,8 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.gram import Gram
 
-LOG_DENSITY = np.log(priors.density())
-INSTABILITY_LOG_DENSITY = np.log(priors.density(priors.INSTABILITY_TAIL))
+LOG_DENSITY = priors.log_density()
+INSTABILITY_LOG_DENSITY = priors.log_density(priors.INSTABILITY_TAIL)
 """Log prior of the sizes of instabilities."""
 
 UNIT_INDEX = int(np.argmin(np.abs(np.log(priors.SIZES))))
@@ -144,9 +144,9 @@ class Sizing:
         self.groups: list[Group] = [*dictionary.always, *(g for _, g in members)]
         self.count = len(dictionary.always)
         self.typical_instability = typical_instability
-        begin = start or Sizes(
-            (UNIT_INDEX,) * self.count, (UNIT_INDEX,) * 7, (UNIT_INDEX,) * len(members)
-        )
+        # what anything else explains is no noise
+        small = tuple(0 if g.random else UNIT_INDEX for g in dictionary.always)
+        begin = start or Sizes(small, (UNIT_INDEX,) * 7, (UNIT_INDEX,) * len(members))
         self.sizes = [*begin.calibration, *begin.members]
         self.instability = list(begin.instability)
         none = np.empty(0, dtype=np.intp)
@@ -160,6 +160,7 @@ class Sizing:
     def run(self) -> tuple[Sizes, float]:
         """Iterate until no size changes; the sizes, and ln Z summed over them."""
         free = [i for i, g in enumerate(self.groups) if g.fixed_size is None]
+        free.sort(key=lambda i: self.groups[i].random)
         channels = np.flatnonzero(self.typical_instability > 0).tolist()
         profiles: list[Array] = []
         for _ in range(MAX_ROUNDS):
@@ -171,7 +172,7 @@ class Sizing:
             if (*self.sizes, *self.instability) == before:
                 break
         score = self.eliminated().score
-        score += sum(LOG_DENSITY[self.sizes[i]] for i in free)
+        score += sum(self.groups[i].log_density[self.sizes[i]] for i in free)
         score += instability_log_prior(self.instability, self.typical_instability)
         for profile in profiles:
             score += float(np.logaddexp.reduce(profile - profile.max()))
@@ -207,7 +208,8 @@ class Sizing:
         for i in free:
             state = self.eliminated()
             gain = gains[i] if state is start else self._gains(state, [i])[i]
-            profile: Array = state.score + gain - gain[self.sizes[i]] + LOG_DENSITY
+            change = gain - gain[self.sizes[i]]
+            profile: Array = state.score + change + self.groups[i].log_density
             self.sizes[i] = int(np.argmax(profile))
             profiles.append(profile)
         return profiles

@@ -45,13 +45,14 @@ class Offer:
     member : cause and variant
     score : predicted score of the set with it
     size : index of its most probable size
-    instability : indices of the set's instability with it
+    calibration, instability : indices of the set's sizes with it
 
     """
 
     member: Member
     score: float
     size: int
+    calibration: tuple[int, ...]
     instability: InstabilityIndices
 
     def with_all_parameters(self) -> Offer:
@@ -81,7 +82,7 @@ class OfferTable:
     @classmethod
     def of(cls, current: Set, level: SetAtInstability, best: BestVariants) -> Self:
         """Offers of the best variants that a set does not contain, the best first."""
-        offers = ranked_offers(current, level.score, level.instability, best)
+        offers = ranked_offers(current, level, best)
         return cls(level.instability, level.state, level.score, offers)
 
 
@@ -101,14 +102,20 @@ def extra_log_odds(
 
 
 def ranked_offers(
-    current: Set, score: float, instability: InstabilityIndices, best: BestVariants
+    current: Set, level: SetAtInstability, best: BestVariants
 ) -> list[Offer]:
     """Offers of causes that a set does not contain, the best first.
 
     Of causes that differ only in their position, the best one.
     """
     offers = [
-        Offer((cause, cause.variants[v]), score + added, size, instability)
+        Offer(
+            (cause, cause.variants[v]),
+            level.score + added,
+            size,
+            level.calibration,
+            level.instability,
+        )
         for cause, (added, v, size) in best.items()
         if cause.key not in current.keys
     ]
@@ -116,6 +123,14 @@ def ranked_offers(
     for offer in sorted(offers, key=lambda o: -o.score):
         best_by_name.setdefault(offer.member[0].name_and_part, offer)
     return [*best_by_name.values()]
+
+
+def _moved(own: tuple[int, ...], *offered: tuple[int, ...]) -> tuple[int, ...]:
+    """Sizes that several offers move, all of them up or down."""
+    return tuple(
+        max(sizes) if max(sizes) > before else min(sizes)
+        for before, *sizes in zip(own, *offered, strict=True)
+    )
 
 
 OfferKey = tuple[SetKey, Sizes | None]
@@ -174,16 +189,15 @@ class Offers:
         return self._tables[offer_key]
 
     def accept(self, current: Set, *offers: Offer) -> Set:
-        """The set with the offered members."""
+        """The set with the offered members, from the sizes at which they gain most.
+
+        From the set's own sizes, flicker would keep what a member explains better.
+        """
         sizes = current.sizes
-        instability = tuple(
-            max(offered) if max(offered) > own else min(offered)
-            for own, *offered in zip(
-                sizes.instability, *(o.instability for o in offers), strict=True
-            )
-        )
+        calibration = _moved(sizes.calibration, *(o.calibration for o in offers))
+        instability = _moved(sizes.instability, *(o.instability for o in offers))
         added = (o.size for o in offers)
-        start = Sizes(sizes.calibration, instability, (*sizes.members, *added))
+        start = Sizes(calibration, instability, (*sizes.members, *added))
         return self.sets.evaluate(
             (*current.members, *(o.member for o in offers)), start
         )

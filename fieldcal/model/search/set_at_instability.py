@@ -16,7 +16,7 @@ from fieldcal.model.causes.cause import CLOSURE, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
-from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Sizes
+from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes
 
 InstabilityIndices = tuple[int, ...]
 """Indices of instabilities in `priors.SIZES`, (7,)."""
@@ -76,12 +76,13 @@ class SetAtInstability:
 
     Attributes
     ----------
-    instability : its indices in `priors.SIZES`
+    calibration, instability : their indices in `priors.SIZES`
     state : posterior of the set's columns at these sizes
     score : ln of evidence times prior probability at these sizes
 
     """
 
+    calibration: tuple[int, ...]
     instability: InstabilityIndices
     state: Eliminated
     score: float
@@ -100,33 +101,33 @@ def at_tried_instabilities(
     base = current.score - state.score - sets.instability_log_prior(own.instability)
 
     def at(
-        instability: InstabilityIndices, prior_sigma: Array, cost: float = 0.0
+        instability: InstabilityIndices, calibration: Sequence[int]
     ) -> SetAtInstability:
         rows = sets.gram_at(instability)
+        prior_sigma, cost = _with_sizes(sets.dictionary, current, calibration)
         there = Eliminated.of(rows.among(few), state.columns, prior_sigma)
         there = replace(there, rows=rows)
         score = base + cost + there.score + sets.instability_log_prior(instability)
-        return SetAtInstability(instability, there, score)
+        return SetAtInstability(tuple(calibration), instability, there, score)
 
-    calibration, cost = with_typical_calibration(sets.dictionary, current)
+    wide = _typical_sizes(current)
     other = None if other_sizes is None else other_sizes.instability
     for instability in tried_instabilities(
         sets.typical_instability, own.instability, other
     ):
-        yield at(instability, state.prior_sigma)
-        if cost and instability != own.instability:
-            yield at(instability, calibration, cost)
+        yield at(instability, own.calibration)
+        if wide != own.calibration and instability != own.instability:
+            yield at(instability, wide)
     if other_sizes is None:
         for sizes in _smaller_permanent_groups(sets.dictionary, current):
-            yield at(own.instability, *_with_sizes(sets.dictionary, current, sizes))
+            yield at(own.instability, sizes)
         return
     always = zip(
         sets.dictionary.always, own.calibration, other_sizes.calibration, strict=True
     )
-    flicker = [theirs if g.random else ours for g, ours, theirs in always]
-    prior_sigma, cost = _with_sizes(sets.dictionary, current, flicker)
-    if (prior_sigma != state.prior_sigma).any():
-        yield at(other_sizes.instability, prior_sigma, cost)
+    flicker = tuple(theirs if g.random else ours for g, ours, theirs in always)
+    if flicker != own.calibration:
+        yield at(other_sizes.instability, flicker)
 
 
 def _smaller_permanent_groups(
@@ -154,8 +155,12 @@ def with_typical_calibration(
     If a large instability absorbs all differences, the most probable sizes of the
     calibration are too small.
     """
-    sizes = [max(size, UNIT_INDEX) for size in current.sizes.calibration]
-    return _with_sizes(dictionary, current, sizes)
+    return _with_sizes(dictionary, current, _typical_sizes(current))
+
+
+def _typical_sizes(current: Set) -> tuple[int, ...]:
+    """Sizes of the permanent groups, none below its typical size."""
+    return tuple(max(size, UNIT_INDEX) for size in current.sizes.calibration)
 
 
 def _with_sizes(
@@ -167,7 +172,7 @@ def _with_sizes(
     for (group, place, before), size in zip(own, sizes, strict=True):
         if group.fixed_size is None and size != before:
             prior_sigma[place] = group.prior_sigma(float(priors.SIZES[size]))
-            cost += float(LOG_DENSITY[size] - LOG_DENSITY[before])
+            cost += float(group.log_density[size] - group.log_density[before])
     return prior_sigma, cost
 
 

@@ -81,7 +81,8 @@ def test_what_is_taken_begins_with_the_sizes_that_were_offered(
     search.offers.accept(there, one, two)
     ((members, start),) = begun
     assert members == (*there.members, one.member, two.member)
-    assert start.calibration == there.sizes.calibration
+    both = zip(one.calibration, two.calibration, there.sizes.calibration, strict=True)
+    assert start.calibration == tuple(min(some) for some in both)
     assert start.members == (*there.sizes.members, one.size, two.size)
     both = zip(one.instability, two.instability, there.sizes.instability, strict=True)
     assert start.instability == tuple(min(some) for some in both)

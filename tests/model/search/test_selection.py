@@ -355,7 +355,7 @@ def test_one_cause_is_tried_in_place_of_two(monkeypatch: pytest.MonkeyPatch) -> 
     def ranked(current: Set, sizes: object) -> list[Offer]:
         # predicted with sizes that suit none of them
         foretold = {jump: -80.0, slip: -81.0, drift: -94.0}
-        return [Offer(there(k), v, 0, empty.sizes.instability)
+        return [Offer(there(k), v, 0, empty.sizes.calibration, empty.sizes.instability)
                 for k, v in foretold.items() if k not in current.keys]  # fmt: skip
 
     monkeypatch.setattr(search.sets, "evaluate", evaluated)

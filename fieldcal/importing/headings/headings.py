@@ -12,6 +12,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from fieldcal.importing.headings.best_columns import NamedColumn, best_columns
+from fieldcal.importing.headings.filtered_axes import (
+    list_names,
+    tell_filtered,
+    without_filtered,
+)
 from fieldcal.importing.headings.heading import Column, HeadingMatch
 from fieldcal.importing.headings.numbered_axes import with_lettered_axes
 from fieldcal.importing.headings.repeated_names import with_distinct_names
@@ -29,11 +34,11 @@ from fieldcal.importing.words.sensor_words import AXES
 from fieldcal.importing.words.telephone_names import sign_of_ios
 from fieldcal.importing.words.thermometer_words import BESIDE_THERMOMETERS, FOREIGN
 
-NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
+NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov",
                "magnitude", "norm", "drift", "delta", "angle", "angles",
                "covariance", "valid", "validity", "flag", "status", "command",
                "commanded", "cmd", "desired", "des", "setpoint", "sp", "target",
-               "error", "err", "residual", "innovation", "filt")  # fmt: skip
+               "error", "err", "residual", "innovation")  # fmt: skip
 """Words of columns that are no samples of a sensor: what is made of them, or wanted."""
 
 ANGULAR = ("angular", "ang", "rotational")
@@ -78,6 +83,7 @@ def match_headings(
         and (said := heading_meaning(column.name, column.unit)) is not None
         and (said.kind == "t" or not _is_no_sample(said))
     ]
+    named, filtered = without_filtered(named)
     named = best_columns(columns, named)
     acc, gyr = _triads(named, "a"), _triads(named, "g")
     if acc is None or gyr is None:
@@ -104,8 +110,11 @@ def match_headings(
         chosen = [*clock, *parts, *both, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
     if left := [three for three in gyr.values() if acc and three not in rates.values()]:
-        told = _left_out([columns[n.number].name for n in left[0]])
+        told = _left_out(list_names(columns, left[0]))
         found[0] = replace(found[0], says=(*found[0].says, told))
+    taken = [n for three in (*acc.values(), *gyr.values()) for n in three]
+    told_of_filters = tell_filtered(columns, filtered, taken)
+    found[0] = replace(found[0], says=(*found[0].says, *told_of_filters))
     if len(found) == 1:
         found = [replace(found[0], name="0")]
     return tuple(found)
@@ -132,9 +141,9 @@ def are_free(columns: Sequence[Column]) -> bool:
     return any(s and s.kind == "a" and s.weak and not s.gain for s in said)
 
 
-def _left_out(names: Sequence[str]) -> str:
+def _left_out(names: str) -> str:
     """Say that rates are taken of no IMU."""
-    return f"{', '.join(names)}: go with no accelerometers by their names; left out"
+    return f"{names}: go with no accelerometers by their names; left out"
 
 
 def columns_without_axes(columns: Sequence[Column]) -> list[int]:

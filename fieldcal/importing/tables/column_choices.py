@@ -74,19 +74,22 @@ def _ask_of_rates(
 ) -> str:
     """Ask which columns are the rates, where those of the forces are told; "" if not.
 
-    The last of `ways` has forces alone.
+    The last of `ways` have forces alone, each those of another device.
     """
     if not ways:
         return ""
-    *beside, alone = ways
+    beside = [one for one in ways if "gx" in one.values()]
+    alone = ways[len(beside) :]
     options = [
         f"--columns {quote(columns_option(one, places, skip))}"
-        for one in (*beside[: MOST - 1], alone)
+        for one in (*beside[: MOST - 1], *alone[:MOST])
     ]
-    timed = has_time(alone.values())
+    timed = has_time(alone[0].values())
+    rates = ", and no turn tells which others are rates" if beside else ""
+    several = ": they are of several devices, of which one is read at a time"
     return (
-        "no name says what its columns are; three of them are as long as gravity, and"
-        " no turn tells which others are rates. Add"
+        "no name says what its columns are; three of them are as long as gravity"
+        f"{f', and so are others{several}' if len(alone) > 1 else ''}{rates}. Add"
         f" {' or '.join(options)}{' without rates' if beside else ''}"
         f"{'' if timed else ', and --rate HZ, as no column is a time'}"
     )

@@ -156,8 +156,9 @@ def likely_columns(
     """Channels by column where no turn tells the rates, the likeliest first.
 
     The forces keep the length of gravity in most rows: of two sets that share axes at
-    rest, one does so when the device is moved. The rates stand beside them. The last
-    way has the likeliest forces alone.
+    rest, one does so when the device is moved. The rates stand beside them, and are no
+    forces themselves. The last ways have forces alone: the likeliest, and those of
+    other devices.
 
     Parameters
     ----------
@@ -176,13 +177,15 @@ def likely_columns(
     forces = sorted(f for f in usual if kept[f] > most - MOVED)
     ways = [
         (force, rate) for force in forces for rate in free.rates
-        if not set(rate) & set(force)
+        if rate not in forces and not set(rate) & set(force)
     ]  # fmt: skip
     ways.sort(key=lambda way: (abs(way[1][0] - way[0][0]), way))
-    alone = {**free.channels, **channels_of("a", forces[0])}
+    devices = [forces[0]]
+    devices += [f for f in forces[1:] if not set(f) & {i for d in devices for i in d}]
     return [
         *({**free.channels, **channels_of("a", f), **channels_of("g", w)}
-          for f, w in ways), alone,
+          for f, w in ways),
+        *({**free.channels, **channels_of("a", f)} for f in devices),
     ]  # fmt: skip
 
 

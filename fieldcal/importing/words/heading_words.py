@@ -43,6 +43,11 @@ SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "n
 
 MEAN = ("mean", "avg", "average")
 
+FILTERED = ("filtered", "filt", "lpf", "lp", "lowpass", "hpf", "highpass", "kalman",
+            "kf", "ekf", "ukf", "smooth", "smoothed", "ema", "sma", "mavg",
+            "butterworth", "savgol", "denoised")  # fmt: skip
+"""Words of columns that a program filters from others."""
+
 REFERENCE = ("true", "truth", "ref", "reference", "expected", "ideal")
 """Words of columns that hold what an output ought to be."""
 

@@ -50,6 +50,10 @@ FLICKER: Array = np.repeat([2e-3, 1e-4], 3)
 """Typical flicker noise: where Allan deviations of consumer grade stay level, 0.2 mg
 and 20 deg/h."""
 
+LARGEST_FLICKER = 10.0
+"""Flicker in typical instabilities beyond which a wander has another cause: of 1 mg and
+60 deg/h, five times what is typical of consumer grade."""
+
 FLICKER_CHANCE = 0.1
 """Probability that the larger part of a bias's wander is flicker, which neighbouring
 windows share, and not an offset that is new in each window."""
@@ -173,7 +177,7 @@ def density(tail: float = SIZE_TAIL) -> Array:
 
 
 @cache
-def log_density(tail: float = SIZE_TAIL) -> Array:
-    """Log prior of each of `SIZES`."""
-    out: Array = np.log(density(tail))
+def log_density(largest: float = np.inf) -> Array:
+    """Log prior of each of `SIZES`; beyond `largest` it falls as instability's too."""
+    out: Array = np.log(density()) - np.log1p((SIZES / largest) ** INSTABILITY_TAIL)
     return out

@@ -68,7 +68,7 @@ class Group:
     fixed_size : v, if it is known; None if it is estimated
     random : whether it is a random process: it is not subtracted from residuals and
         not used for predictions
-    size_tail : how the prior of its size falls, as `priors.SIZE_TAIL`
+    largest : size v beyond which it has another cause
 
     """
 
@@ -87,12 +87,12 @@ class Group:
     shape_sigma: float = np.nan
     fixed_size: float | None = None
     random: bool = False
-    size_tail: float = priors.SIZE_TAIL
+    largest: float = np.inf
 
     @property
     def log_density(self) -> Array:
         """Log prior of each of `priors.SIZES`."""
-        return priors.log_density(self.size_tail)
+        return priors.log_density(self.largest)
 
     @property
     def names(self) -> list[str]:

@@ -135,13 +135,13 @@ def _cosine_flicker(table: ColumnTable) -> Iterator[Group]:
 def series_flicker(table: ColumnTable, series: FlickerSeries) -> Iterator[Group]:
     """Flicker of each triad as a series, for few windows without other instability.
 
-    It stands for the instability, and is no larger.
+    It stands for the instability, and is hardly larger than that of devices.
     """
     many = len(series.sizes)
     at = table.add_course("flicker", lambda x: series.at(x.t), many, True)
     terms = list(at.reshape(6, many))
     for group in _flicker_groups(table, terms, series.sizes, priors.INSTABILITY):
-        yield replace(group, size_tail=priors.INSTABILITY_TAIL)
+        yield replace(group, largest=priors.LARGEST_FLICKER)
 
 
 def _flicker_groups(

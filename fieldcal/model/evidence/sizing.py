@@ -25,7 +25,7 @@ from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalue
 from fieldcal.model.evidence.gram import Gram
 
 LOG_DENSITY = priors.log_density()
-INSTABILITY_LOG_DENSITY = priors.log_density(priors.INSTABILITY_TAIL)
+INSTABILITY_LOG_DENSITY = np.log(priors.density(priors.INSTABILITY_TAIL))
 """Log prior of the sizes of instabilities."""
 
 UNIT_INDEX = int(np.argmin(np.abs(np.log(priors.SIZES))))

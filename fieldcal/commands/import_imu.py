@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from fieldcal.importing.session.ingest import ImportedSession
     from fieldcal.windows.joined_rests import RestPeriod
 
+LEAST_S = 1.0
+"""Shortest rest that is one, whatever --still says, s: shorter means have no error."""
+
 
 def import_imu(
     args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
@@ -76,7 +79,7 @@ def _counted_rests(rests: Sequence[RestPeriod], still: float) -> str:
     # the last sample of a rest begins no interval
     if rests and min(rest.end - rest.start for rest in rests) < 0.9 * still:
         return said
-    return f"{said} of {still:g} s or more"
+    return f"{said} of {max(still, LEAST_S):g} s or more"
 
 
 def _tell_of_rows(
@@ -135,7 +138,11 @@ def _tell_no_rests(
         shorter = ", or try --still with a shorter time" if args.still > 1 else ""
         table = ", with speed_deg_s where a rate table turned it"
         alone = table if {*measured} == {"g"} else ""
-        sys.stderr.write(f"write the positions into session.toml{alone}{shorter}\n")
+        sys.stderr.write(
+            f"write the positions into session.toml{alone}{shorter}; rests shorter than"
+            " 1 s are none: hold each for 3 s or more, or import a table of their means"
+            " with --sigma 0.005,0.0005\n"
+        )
 
 
 def _import_means(

@@ -93,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="S",
-        help="shortest time at rest that counts as a position, s (default: 1)",
+        help="shortest rest that counts as a position, s (default and least: 1)",
     )
     add(
         "--sigma",

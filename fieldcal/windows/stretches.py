@@ -173,7 +173,9 @@ def explain_no_stretch(rows: CellRows, origin: Array) -> str:
     rows = LiveAxisRows(rows)
     runs = find_rest_runs(rows, StillnessLimits().noise)
     if not runs:
-        return "nowhere is it calmer than elsewhere, or it turns all the time"
+        return (
+            "nowhere is it calmer than elsewhere for a second, or it turns all the time"
+        )
     longest = max(runs, key=lambda run: run.last - run.first)
     cells = cell_table(rows[longest.first : longest.last + 1], origin)
     start, end = float(cells.times[0]), float(cells.times[-1])

@@ -180,6 +180,8 @@ def test_a_log_of_rests_without_times_needs_no_more_than_its_rate(
     said = capsys.readouterr().err
     assert "only its rests were recorded" in said
     assert "8 still stretches\n" in said  # of 0.6 s
+    assert "8 of 8 last less than 1 s, too short for their means to have an err" in said
+    assert "or import a table of their means with --sigma 0.005,0.0005" in said
     made = Session.open(tmp_path / "s")
     assert len(made.about.positions) == 8
     # with times of their own the pauses between the rests would show
@@ -187,6 +189,17 @@ def test_a_log_of_rests_without_times_needs_no_more_than_its_rate(
     path = write(tmp_path, timed, "timed.csv", "t (s),ax,ay,az")
     assert main(["import", str(path), "-o", str(tmp_path / "timed")]) == 0
     assert "only its rests" not in capsys.readouterr().err
+
+
+def test_rests_of_less_than_a_second_are_told_what_to_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, turned(3, 200.0, 0.5), heading="t,ax,ay,az,gx,gy,gz")
+    call = ["import", str(path), "-o", str(tmp_path / "s"), "--still", "0.3"]
+    assert main(call) == 0
+    said = capsys.readouterr().err
+    assert "0 still stretches of 1 s or more" in said
+    assert "hold each for 3 s or more, or import a table of their means with" in said
 
 
 def test_a_position_in_which_it_was_nudged_is_two(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.files.spool import SpooledRows
-from fieldcal.windows.cells import CellTable, SamplesBetween
+from fieldcal.windows.cells import CELL, CellTable, SamplesBetween
 from fieldcal.windows.joined_rests import RestPeriod, join_rests
 from fieldcal.windows.jumps import JumpFinder
 from fieldcal.windows.stretch_ends import stretch_end_reasons
@@ -20,6 +20,7 @@ from fieldcal.windows.stretches import (
     explain_no_stretch,
     still_stretches_of_file,
 )
+from fieldcal.windows.window import FEWEST_CELLS
 
 ONLY_RESTS = (
     "it has no times and turns within no row, so only its rests were recorded, and each"
@@ -107,6 +108,7 @@ def find_rests(
             how += f", and {more} of them {'is' if more == 1 else 'are'} cut where it"
             how += " was moved or knocked"
         found = join_rests(rows, rest.origin, between, spans)
+        how += _tell_short(spans)
     else:
         how, spans = "", still_stretches_of_file(rows, rest.origin, between, still)
         found = join_rests(rows, rest.origin, between, spans)
@@ -118,6 +120,20 @@ def find_rests(
         np.array(forces).reshape(-1, 3),
         how,
         f"no still stretch was found: {why}" if why else "",
+    )
+
+
+def _tell_short(spans: Sequence[tuple[float, float]]) -> str:
+    """Say that the means of short rests have no error, and what to do."""
+    least = FEWEST_CELLS * CELL
+    # the last sample of a rest begins no interval
+    short = sum(end - start < (1 - CELL) * least for start, end in spans)
+    if not short:
+        return ""
+    return (
+        f"; {short} of {len(spans)} last less than {least:g} s, too short for their"
+        " means to have an error: hold each for longer, say another --rate if that is"
+        " not it, or import a table of their means with --sigma 0.005,0.0005"
     )
 
 

@@ -548,3 +548,15 @@ def test_bursts_with_pauses_between_are_no_batches(
     )
     session = imported(path, "--gyr-unit", "rad/s")
     np.testing.assert_allclose(session.block.t, t, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["table rate (deg/s)", "speed", "angle [deg]"])
+def test_what_a_table_was_told_is_no_time_though_it_grows(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = np.arange(-200.0, 201.0, 50.0)
+    read = np.column_stack([told * f + b for f, b in ((1.01, 0.5), (0.99, -1), (1, 0))])
+    head = f"{name},gyro x (deg/s),gyro y (deg/s),gyro z (deg/s)"
+    path = write(tmp_path, np.column_stack([told, read]), heading=head)
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "no column is t, the time: give the rate" in capsys.readouterr().err

@@ -16,6 +16,7 @@ from fieldcal.importing.units.scales import MIN_ROWS
 from fieldcal.importing.words.heading_words import (
     heading_meaning,
     is_counter,
+    is_other_quantity,
     words_in_name,
 )
 from fieldcal.importing.words.sensor_words import AXES
@@ -57,6 +58,7 @@ def free_columns(
     """The time of a table (n, k), and sets of its columns that may be axes."""
     channels = dict(known)
     times = [i for i in _growing(table) if i not in known]
+    times = [i for i in times if not is_other_quantity(names[i])]
     if "t" not in channels.values():
         clocks = [
             i for i in times if not (_counts(table[:, i]) or is_counter(names[i]))

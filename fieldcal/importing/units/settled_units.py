@@ -14,6 +14,7 @@ import numpy as np
 from fieldcal.core.samples import Block
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.recording import MAX_READING, Recording
+from fieldcal.importing.units.alike_turns import tell_alike_turns
 from fieldcal.importing.units.file_times import FIRST_ROWS, settle_time_units
 from fieldcal.importing.units.turned_axes import NamedColumns
 from fieldcal.importing.units.unit_doubts import check_format_units, check_one_unit
@@ -60,7 +61,7 @@ def settle_units(recording: Recording, stream: str) -> AssumedUnits:
         check_one_unit(parts)
     for part in parts:
         part.wanted = guess.on(part.wanted)
-    parts[0].says += guess.doubts
+    parts[0].says += [*guess.doubts, *tell_alike_turns(block)]
     taken = {k: why for one in (*parts, heard) for k, why in one.guessed.items()}
     taken |= {"time": times[0]} if times else {}
     return AssumedUnits(taken | guess.found, guess.acc_bias)

@@ -62,6 +62,10 @@ COUNTERS = ("packet", "packets", "counter", "count", "cntr", "cnt", "index", "id
             "sequence", "id", "n")  # fmt: skip
 """Words of columns that count rows or messages."""
 
+TURNED = ("rate", "rates", "speed", "rpm", "angle", "commanded", "command", "cmd",
+          "setpoint", "target")  # fmt: skip
+"""Words of what a table does, whose steps may only grow."""
+
 COUNTED = ("data", "message", "messages", "msg", "record", "records")
 """Words of what is counted, which stand beside them."""
 
@@ -287,6 +291,19 @@ def is_counter(name: str) -> bool:
     """
     words = words_in_name(name)
     return bool({*words} & {*COUNTERS}) and {*words} <= {*COUNTERS, *COUNTED}
+
+
+def is_other_quantity(name: str) -> bool:
+    """Whether a name is that of a quantity that may only grow, and is no time.
+
+    >>> [is_other_quantity(one) for one in ("table rate (deg/s)", "rpm", "T [K]", "c1")]
+    [True, True, True, False]
+    """
+    said = heading_meaning(name)
+    if said is not None:
+        return said.kind == "temperature"
+    units = {unit for _, unit in name_unit_splits(name, "") if unit}
+    return bool(units - {*UNITS["t"]} or {*words_in_name(name)} & {*TURNED})
 
 
 def _find_phrase(words: Sequence[str], phrase: Sequence[str]) -> int | None:

@@ -178,6 +178,13 @@ SIX = "ax,ay,az,gx,gy,gz"
 
 
 FORMS: dict[str, Writer] = {
+    "a word before each row": lambda: each(
+        "IMU:{:.3f},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}", T, A, W
+    ),
+    "a word before each row, and others between": lambda: each(
+        "$RAW: {:.3f};{:.6g};{:.6g};{:.6g};{:.6g};{:.6g};{:.6g}\nBAT:{:.3f};3.98;77",
+        T, A, W, T,
+    ),
     "lines of several kinds": mixed,
     "two sensors in turn": in_turn,
     "messages as ROS shows them": echoed,

@@ -106,3 +106,23 @@ def test_a_number_in_what_a_line_is_called_may_count_lines(tmp_path: Path) -> No
     lines = [f"Sample {i}: {axes(FORCE[i], 'ax ay az')}" for i in range(ROWS)]
     (block,) = read(tmp_path, lines, False).values()
     np.testing.assert_array_equal(block.acc, FORCE)
+
+
+@pytest.mark.parametrize(
+    "warm",
+    ["temperature: 31.047 degrees Celsius", "Temperature is 31.047 degrees C",
+     "Temperature 31.047 deg C"],
+)  # fmt: skip
+def test_a_temperature_in_a_line_of_its_own_is_read(tmp_path: Path, warm: str) -> None:
+    """As the sketch of the Arduino Playground and others print it."""
+    lines = [
+        text
+        for a, w in zip(FORCE, RATES, strict=True)
+        for text in (
+            "MPU-6050", warm, "accel x,y,z: {:.3f}, {:.3f}, {:.3f}".format(*a),
+            "gyro x,y,z : {:.4f}, {:.4f}, {:.4f}, ".format(*w),
+        )
+    ]  # fmt: skip
+    (block,) = read(tmp_path, lines, timed=False).values()
+    np.testing.assert_allclose(block.temperature, 31.047)
+    np.testing.assert_allclose(block.acc, FORCE)

@@ -18,7 +18,7 @@ from fieldcal.importing.words.heading_units import THERMOMETERS, parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.importing.words.sensor_words import AXES
 
-MAX_UNIT_LETTERS = 12
+MAX_UNIT_LETTERS = 18
 """Letters of a unit; what is longer is a sentence."""
 
 _LIST = re.compile(rf"(?<=[:=])\s*[\[({{<]\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*[\])}}>]")
@@ -69,7 +69,7 @@ _THREE = re.compile(
 _UNNAMED = re.compile(rf"\s*({NUMBER})\s*(\D+?)\s*")
 """A value with its unit alone in a line."""
 
-_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({NUMBER}\D*)")
+_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)(?:\s+is)?\s+({NUMBER}\D*)")
 """A label with its value alone in a line, as programs print a temperature."""
 
 

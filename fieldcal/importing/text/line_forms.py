@@ -10,10 +10,14 @@ from operator import xor
 from typing import Self
 
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, is_true_of_most
+from fieldcal.importing.text.text_top import find_separator
 
 _CHECKED = re.compile(r"\s*[$!]?([^*]*)\*([0-9A-Fa-f]{2})\s*")
 _ENTRY = re.compile(r"(\s*)(?:- )?([A-Za-z_]\w*):\s*(\S*)\s*")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+_WORD_BEFORE = re.compile(r"\s*\$?([A-Za-z_]\w*):\s*([-+.\d][^:=]*[,;\s][^:=]*)")
+"""A word before numbers, of which no other has a name."""
 
 END_MARK = ";"
 """At the end of a line, as programs in C end theirs."""
@@ -72,6 +76,30 @@ class EndedLines(TextForm):
 
         def one(line: str) -> str:
             return line.rstrip().removesuffix(END_MARK) if _ends(line) else line
+
+        return lambda lines: [one(line) for line in lines]
+
+
+class WordPrefix(TextForm):
+    """Lines ``IMU:0.1,0.2,9.8,0,0,0``: the word is a cell as the others are."""
+
+    def __init__(self, separator: str) -> None:
+        self._separator = separator
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
+        """The form, if most lines have it."""
+        said = [one for line in lines if (one := _WORD_BEFORE.fullmatch(line))]
+        if len(said) <= MOSTLY * len(lines):
+            return None
+        return cls(separator or find_separator(said[-1][2]) or " ")
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+        def one(line: str) -> str:
+            said = _WORD_BEFORE.fullmatch(line)
+            return line if said is None else f"{said[1]}{self._separator}{said[2]}"
 
         return lambda lines: [one(line) for line in lines]
 

@@ -4,6 +4,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     "1,714,746"  1 714 746  1'714'746  thousands that are set apart
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
     Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
+    IMU:0.1,0.2,9.8,0,0,0              a word before the columns
     AcX,12,AcY,-45,AcZ,16384           values behind cells with their names
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
     $IMU,0.01,0.1*5A                   lines with a checksum
@@ -38,7 +39,12 @@ from fieldcal.importing.text.dataflash_text import DataflashText
 from fieldcal.importing.text.grouped_digits import GroupedDigits
 from fieldcal.importing.text.labelled_lines import LabelledValues
 from fieldcal.importing.text.labview_text import LabviewText
-from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
+from fieldcal.importing.text.line_forms import (
+    CheckedLines,
+    EchoedMessages,
+    EndedLines,
+    WordPrefix,
+)
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
 from fieldcal.importing.text.nested_values import NestedValues
 from fieldcal.importing.text.paired_cells import PairedCells
@@ -240,7 +246,7 @@ FORMS: tuple[type[TextForm], ...] = (
     ZephyrLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
     QuotedCells, PairedCells, FortranNumbers, UnitCells,
-    LongTable, NestedValues, LabelledValues, BarTable, ListCells,
+    LongTable, NestedValues, LabelledValues, WordPrefix, BarTable, ListCells,
     SplitDecimals, SensorCodes, TaggedLines, ArrivalPrefix, HexCells, BareFractions,
     ClockColumn,
 )  # fmt: skip

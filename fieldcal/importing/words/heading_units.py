@@ -33,9 +33,11 @@ SPELLINGS = {
     "min": ("min", "mins", "minute", "minutes"),
     "h": ("h", "hrs"),
     "deg C": ("c", "°c", "°", "'c", "degc", "deg c", "celsius", "℃", "degrees c",
-              "deg.c", "ºc", "cel"),
+              "deg.c", "ºc", "cel", "degrees celsius", "deg celsius", "degree c",
+              "degree celsius"),
     "K": ("kelvin", "degk", "deg k"),
-    "deg F": ("°f", "degf", "deg f", "fahrenheit", "℉", "degrees f", "ºf"),
+    "deg F": ("°f", "degf", "deg f", "fahrenheit", "℉", "degrees f", "ºf",
+              "degrees fahrenheit", "deg fahrenheit"),
 }  # fmt: skip
 """How each unit is written."""
 
@@ -46,7 +48,8 @@ TEMPERATURES = {"deg C": "degC", "K": "K", "deg F": "degF"}
 """Units of temperatures, and what ``--temp-unit`` calls them."""
 
 THERMOMETERS = (*SPELLINGS["K"], *SPELLINGS["deg F"], "°c", "degc", "deg c", "celsius",
-                "℃", "degrees c", "deg.c", "ºc", "cel")  # fmt: skip
+                "℃", "degrees c", "deg.c", "ºc", "cel", "degrees celsius",
+                "deg celsius", "degree c", "degree celsius")  # fmt: skip
 """Units that tell a thermometer, whatever it is called: a lone c or ° may be any."""
 
 HALF_ANGLE = "half rad"

@@ -40,14 +40,39 @@ def test_other_axes_are_asked_about_with_their_names(
     """Column k holds the rate about axis order[k], times its sign."""
     written = np.column_stack([T, A, W[:, order] * signs])
     path = write(tmp_path, written, heading=HEAD.format("wx", "wy", "wz"))
-    with pytest.raises(InputError, match=f"if these are {named}: add") as raised:
+    with pytest.raises(InputError, match=f"if these are {named}[:,] ") as raised:
         read_files([path])
-    first, second = re.findall(r"--columns (\S+?),? ", f"{raised.value} ")
+    first, *_, second = re.findall(r"--columns (\S+?),? ", f"{raised.value} ")
     for option, rates in ((first, W), (second, W[:, order] * signs)):
         out = tmp_path / f"as_{option.count('-')}{option[-2:]}{rates is W}"
         columns = ["--columns", shlex.split(option)[0]]
         assert main(["import", str(path), *columns, "-o", str(out)]) == 0
         np.testing.assert_allclose(Session.open(out).block.gyr, rates, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("order", "signs"),
+    [((0, 1, 2), (1, 1, -1)), ((1, 0, 2), (1, 1, 1)), ((1, 2, 0), (1, 1, 1)),
+     ((2, 1, 0), (-1, 1, 1)), ((0, 2, 1), (-1, -1, -1))],
+)  # fmt: skip
+def test_forces_that_are_named_otherwise_are_asked_about_as_well(
+    tmp_path: Path, order: tuple[int, ...], signs: tuple[int, ...]
+) -> None:
+    """Column k holds the force along axis order[k], times its sign.
+
+    No turn tells a force from its opposite, so of both the one with fewer signs.
+    """
+    written = np.column_stack([T, A[:, order] * signs, W])
+    path = write(tmp_path, written, heading=HEAD.format("wx", "wy", "wz"))
+    with pytest.raises(InputError, match=", or if the forces ax ay az are ") as raised:
+        read_files([path])
+    _, option, _ = re.findall(r"--columns (\S+?),? ", f"{raised.value} ")
+    columns = ["--columns", shlex.split(option)[0]]
+    assert main(["import", str(path), *columns, "-o", str(tmp_path / "out")]) == 0
+    block = Session.open(tmp_path / "out").block
+    minus = sum(sign < 0 for sign in signs)
+    np.testing.assert_allclose(block.acc, A if minus < 2 else -A, atol=1e-6)
+    np.testing.assert_allclose(block.gyr, W, atol=1e-8)
 
 
 def test_where_the_user_names_them_it_is_said(

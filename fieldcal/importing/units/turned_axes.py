@@ -4,7 +4,10 @@
 
 Loggers write two chips that lie turned to each other, or the rates in the order yaw,
 pitch, roll, under the same x, y and z. Each of the 48 ways P to name the rates anew,
-some of them with the other sign, is held against the turns of gravity.
+some of them with the other sign, is held against the turns of gravity. It may as well
+be the forces that are named otherwise: with M = P^T or -P^T, and P right-handed,
+
+    d(M u)/dt = M u x w                                                            (2)
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from fieldcal.importing.units.rate_size import (
     lagged_sums,
 )
 
-GYROSCOPES = CHANNELS[3:]
+ACCELEROMETERS, GYROSCOPES = CHANNELS[:3], CHANNELS[3:]
 
 APART = 0.3
 """How much less correlated (1) is as the rates are named than in the way that holds."""
@@ -58,6 +61,28 @@ class AxisNaming(NamedTuple):
         """
         pairs = zip(self.axes, self.signs, strict=True)
         return tuple(("-" if sign < 0 else "") + GYROSCOPES[i] for i, sign in pairs)
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """What those of the forces are called where the rates keep their names, by (2).
+
+        Of both ways the one with fewer other signs: whoever turns one sign does so with
+        the forces. Empty where neither does: a sign of the rates is another one then.
+
+        >>> AxisNaming((0, 1, 2), (-1, -1, 1)).forces
+        ('ax', 'ay', '-az')
+        >>> AxisNaming((1, 0, 2), (-1, -1, -1)).forces
+        ('ay', 'ax', 'az')
+        """
+        if np.linalg.det(self.matrix) < 0:
+            return ()
+        back = [self.axes.index(i) for i in range(3)]
+        signs = [self.signs[i] for i in back]
+        usual = 1 if sum(signs) > 0 else -1
+        return tuple(
+            ("-" if sign != usual else "") + ACCELEROMETERS[i]
+            for i, sign in zip(back, signs, strict=True)
+        )
 
     @property
     def matrix(self) -> Array:
@@ -173,14 +198,20 @@ class NamedColumns(NamedTuple):
         )
         if self.by_user or not self.columns:
             return [f"{odd}: the axes of the two sensors are not the same"]
+        others = [self._with(GYROSCOPES, way.names)]
+        if way.forces:
+            others.append(self._with(ACCELEROMETERS, way.forces))
+            odd += f", or if the forces ax ay az are {' '.join(way.forces)}"
+        options = " or ".join(f"--columns {quote(one)}" for one in others)
         raise InputError(
-            f"{self.file}: {odd}: add --columns {quote(self._with(way.names))} or"
-            f" --columns {quote(self._with(GYROSCOPES))}, if they are as named"
+            f"{self.file}: {odd}: add {options} or"
+            f" --columns {quote(self._with(GYROSCOPES, GYROSCOPES))}, if they are as"
+            " named"
         )
 
-    def _with(self, names: Sequence[str]) -> str:
-        """All columns, with these names of the rates."""
-        called = dict(zip(GYROSCOPES, names, strict=True))
+    def _with(self, old: Sequence[str], names: Sequence[str]) -> str:
+        """All columns, with these names of those of a sensor."""
+        called = dict(zip(old, names, strict=True))
         parts = (one.partition("=") for one in self.columns)
         return ",".join(
             self._signed(channel, called.get(channel, channel)) + behind + place

@@ -335,3 +335,12 @@ def test_an_axis_that_a_position_lacks_is_unknown_there_alone(tmp_path: Path) ->
     rows[3, 0] = np.nan
     _, made = session(tmp_path, rows, SIX, "--sigma", "0.005,0.0005")
     assert np.argwhere(np.isnan(made.about.mean_sigma)).tolist() == [[3, 0]]
+
+
+def test_of_named_means_no_rate_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session(tmp_path, means(3, 12)[:, :3], "acc_x,acc_y,acc_z")
+    said = capsys.readouterr().err
+    assert "taken from the names of its columns: --columns ax,ay,az" in said
+    assert "--rate" not in said

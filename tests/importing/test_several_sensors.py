@@ -160,3 +160,20 @@ def test_axes_of_a_file_may_be_called_values(tmp_path: Path) -> None:
 )
 def test_a_counter_is_one_whatever_it_counts(name: str, counts: bool) -> None:
     assert is_counter(name) == counts
+
+
+def test_what_rates_ought_to_be_is_no_accelerometer(tmp_path: Path) -> None:
+    """As a rate table's log has it beside them; without a turn of gravity no unit."""
+    speed = np.concatenate([np.zeros(100), np.full(300, 2.0), np.zeros(100)])
+    noise = np.random.default_rng(3).normal(0, 0.002, (len(speed), 3))
+    rates = np.column_stack([0 * speed, 0 * speed, 1.01 * speed]) + 0.01 + noise
+    ought = np.column_stack([0 * speed, 0 * speed, speed])
+    t = np.arange(len(speed)) / 100
+    head = "run,t,gx,gy,gz,ref_x,ref_y,ref_z"
+    table = np.column_stack([np.ones_like(t), t, rates, ought])
+    path = write(tmp_path, table, heading=head)
+    found = open_recording(path, ReadOptions(gyr_unit="rad/s"))
+    (stream,) = found.streams()
+    block = next(iter(found.alone(stream.name).blocks(stream.name)))
+    np.testing.assert_allclose(block.gyr, rates[: len(block)])
+    assert np.isnan(block.acc).all()

@@ -108,7 +108,8 @@ class HeadingMatch:
         Parameters
         ----------
         wanted : the options that are taken
-        rate_said : whether the file says its rate, which no option has to say again
+        rate_said : whether the file says its rate, which no option has to say again, or
+            its rows need none, as means
         told_by : what says the sensor
 
         """

@@ -23,6 +23,7 @@ from fieldcal.importing.headings.repeated_names import with_distinct_names
 from fieldcal.importing.words.heading_units import HALF_ANGLE, UNITS
 from fieldcal.importing.words.heading_words import (
     MEAN,
+    REFERENCE,
     SCATTER,
     HeadingMeaning,
     bare_axis,
@@ -155,7 +156,11 @@ def columns_without_axes(columns: Sequence[Column]) -> list[int]:
             {*words_in_name(column.name)},
         )
         kind = said.kind if said is not None else ""
-        if words & {*SCATTER} or kind == "m" or (words & {*ANGLES} and kind != "g"):
+        if (
+            words & {*SCATTER, *REFERENCE}
+            or kind == "m"
+            or (words & {*ANGLES} and kind != "g")
+        ):
             found.append(i)
     return found
 

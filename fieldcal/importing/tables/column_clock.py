@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing import columns
@@ -17,7 +15,7 @@ from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.tables.column_source import (
     ColumnSource,
     column_numbers,
-    rates_in_degrees,
+    holds_means,
 )
 from fieldcal.importing.tables.column_times import (
     ask_rate_of_counter,
@@ -28,7 +26,6 @@ from fieldcal.importing.tables.column_times import (
     split_seconds,
 )
 from fieldcal.importing.tables.time_column import TimeColumn
-from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.importing.words.heading_words import heading_meaning
 
 
@@ -115,14 +112,8 @@ class ColumnClock:
             return wanted
         said = self._of.rate_said()
         if said is None:
-            at = column_numbers(self._of, wanted)
-            acc, gyr = ([at[k + x] for x in "xyz" if k + x in at] for k in "ag")
-            table = self._of.beginning() if len(acc) == len("xyz") else np.empty((0, 0))
-            rates = rates_in_degrees(table, gyr, wanted)
-            means = len(table) and (
-                wanted.means or are_means(table[:, acc], None, rates)
-            )
             # of means nobody knows when: they are counted
+            means = holds_means(self._of, wanted)
             return replace(wanted, rate_hz=1.0) if means else wanted
         rate, where = said
         sentence = f"it says the rate: {where!r}"

@@ -31,13 +31,12 @@ from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.axis_triples import unnamed_axes
 from fieldcal.importing.tables.column_choices import ask_of_choices, columns_option
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate
-from fieldcal.importing.tables.column_source import column_numbers, rates_in_degrees
+from fieldcal.importing.tables.column_source import column_numbers, holds_means
 from fieldcal.importing.tables.column_times import is_row_counter
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
 from fieldcal.importing.tables.means import row_scatter, scatter_columns
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
-from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.importing.words.heading_words import heading_meaning
 
 
@@ -128,14 +127,9 @@ class ColumnRecording(Recording):
     def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""
         table, wanted = self.beginning(), self.wanted
+        if not holds_means(self, wanted):
+            return None
         at = column_numbers(self, wanted)
-        if not {"ax", "ay", "az"} <= set(at) or not len(table):
-            return None
-        t = table[:, at["t"]] * wanted.time_scale if "t" in at else None
-        three = [[at[k + x] for x in "xyz" if k + x in at] for k in "ag"]
-        gyr = rates_in_degrees(table, three[1], wanted)
-        if not (wanted.means or are_means(table[:, three[0]], t, gyr)):
-            return None
         fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
         where = scatter_columns(next(fits, Heading([])).columns)
         means, values = (_columns_of(table, places) for places in (at, where))
@@ -182,7 +176,8 @@ class ColumnRecording(Recording):
         taken = {one.name: one.taken(self.wanted) for one in named}
         rate = self.rate_said()
         for one in named:
-            sentence = one.sentence(taken[one.name], rate is not None, self.told_by)
+            timed = rate is not None or holds_means(self, taken[one.name])
+            sentence = one.sentence(taken[one.name], timed, self.told_by)
             alone = [sentence] if len(named) == 1 else []
             self.says += [s for s in (*alone, *one.says) if s not in self.says]
         return taken
@@ -260,7 +255,7 @@ class ColumnRecording(Recording):
             known |= _known([one], way)
         others = {
             i for i, c in enumerate(way.columns) if heading_meaning(c.name, c.unit)
-        }
+        } | {*headings.columns_without_axes(way.columns)}
         names = [c.name for c in way.columns]
         threes = unnamed_axes(self.beginning(), names, {*known, *others})
         if not threes:

@@ -11,6 +11,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.session.units import UNSCALED
 
 
@@ -44,6 +45,17 @@ def column_numbers(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:
         return {name: i for i, (name, _, _) in enumerate(names)}
     places = [c.place for way in source.heading() for c in way.columns]
     return {n: places.index(p) for n, _, p in names if p in places}
+
+
+def holds_means(source: ColumnSource, wanted: ReadOptions) -> bool:
+    """Whether rows are means, read with these options."""
+    table, at = source.beginning(), column_numbers(source, wanted)
+    if not {"ax", "ay", "az"} <= set(at) or not len(table):
+        return False
+    t = table[:, at["t"]] * wanted.time_scale if "t" in at else None
+    acc, gyr = ([at[k + x] for x in "xyz" if k + x in at] for k in "ag")
+    rates = rates_in_degrees(table, gyr, wanted)
+    return wanted.means or are_means(table[:, acc], t, rates)
 
 
 def rates_in_degrees(

@@ -560,3 +560,21 @@ def test_what_a_table_was_told_is_no_time_though_it_grows(
     path = write(tmp_path, np.column_stack([told, read]), heading=head)
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
     assert "no column is t, the time: give the rate" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("integrated", [False, True])
+def test_gravity_tells_rates_that_are_called_as_angles(
+    tmp_path: Path, integrated: bool
+) -> None:
+    """Both the rate and the angle that is integrated from it are called gyro_roll."""
+    rows = turned(8, 50.0, 2.0)
+    if integrated:
+        rows[:, 4:] = np.cumsum(rows[:, 4:], axis=0) / 50.0
+    names = "accelForward,accelLeft,accelUp,gyro_roll,gyro_pitch,gyro_yaw"
+    path = write(tmp_path, rows, heading=f"time,{names}")
+    session = imported(path)
+    if integrated:
+        assert np.isnan(session.block.gyr).all()
+        np.testing.assert_allclose(session.block.acc, rows[:, 1:4], rtol=1e-5)
+    else:
+        assert_same(session, rows)

@@ -31,6 +31,7 @@ from fieldcal.importing.words.heading_words import (
     heading_meaning,
     words_in_name,
 )
+from fieldcal.importing.words.rate_names import RATES
 from fieldcal.importing.words.sensor_words import AXES
 from fieldcal.importing.words.telephone_names import sign_of_ios
 from fieldcal.importing.words.thermometer_words import BESIDE_THERMOMETERS, FOREIGN
@@ -147,8 +148,12 @@ def _left_out(names: str) -> str:
     return f"{names}: go with no accelerometers by their names; left out"
 
 
-def columns_without_axes(columns: Sequence[Column]) -> list[int]:
-    """Columns whose names exclude that they are axes of an IMU."""
+def columns_without_axes(columns: Sequence[Column], turns: bool = False) -> list[int]:
+    """Columns whose names exclude that they are axes of an IMU.
+
+    With `turns`, gravity's turns will tell a rate from an angle that was integrated
+    from it, both of which are called ``gyro_roll``.
+    """
     found = []
     for i, column in enumerate(columns):
         said, words = (
@@ -159,7 +164,7 @@ def columns_without_axes(columns: Sequence[Column]) -> list[int]:
         if (
             words & {*SCATTER, *REFERENCE}
             or kind == "m"
-            or (words & {*ANGLES} and kind != "g")
+            or (words & {*ANGLES} and kind != "g" and not (turns and words & {*RATES}))
         ):
             found.append(i)
     return found

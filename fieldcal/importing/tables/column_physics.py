@@ -48,6 +48,8 @@ AS_LONG, MOVED = 0.3, 0.1
 """Part by which |a| differs from gravity in few rows, even of a moved device; and the
 share of these rows."""
 
+BY_TURNS = "gravity turns in the first three as the other three say"
+
 LEAST_COUNTS = 1000.0
 """Counts in a g by which an accelerometer is told without turns."""
 
@@ -120,6 +122,20 @@ def possible_columns(
     ]
 
 
+def turning_columns(
+    table: Array, names: Sequence[str], known: Mapping[int, str]
+) -> IdentifiedColumns | None:
+    """The only two sets of axes that turn as one says of the other; None otherwise.
+
+    Parameters
+    ----------
+    table, names, known : as of `identify_columns`
+
+    """
+    found = possible_columns(table, names, known)
+    return IdentifiedColumns(found[0], BY_TURNS) if len(found) == 1 else None
+
+
 def _force_and_rate_triples(
     table: Array, clock: Array, forces: Sequence[Three], rates: Sequence[Three]
 ) -> tuple[tuple[Three, Three | None], str] | None:
@@ -128,7 +144,7 @@ def _force_and_rate_triples(
     usual = [*sizes]
     turning = _turning_pairs(table, clock, sizes, rates)
     if len(turning) == 1:
-        return turning[0], "gravity turns in the first three as the other three say"
+        return turning[0], BY_TURNS
     if turning:
         return None
     if usual_step(clock) and not any(_gravity(table, three) for three in usual):

@@ -213,10 +213,14 @@ class ColumnRecording(Recording):
         names = [c.name for c in way.columns] if way else []
         names = names if len(names) == k else [""] * k
         known = _known(named, way)
-        if way is not None and len(way.columns) == k and len(table):
-            table = table.copy()
-            table[:, headings.columns_without_axes(way.columns)] = np.nan
-        told = column_physics.identify_columns(table, names, known)
+        over = way.columns if way is not None and len(way.columns) == k else []
+        told = column_physics.identify_columns(
+            _without(table, headings.columns_without_axes(over)), names, known
+        )
+        if "gx" not in (known if told is None else told.channels).values():
+            # names of rates that may be angles, which do not turn gravity
+            doubted = _without(table, headings.columns_without_axes(over, True))
+            told = column_physics.turning_columns(doubted, names, known) or told
         if told is None:
             return None
         places = [c.place for c in way.columns] if way and not way.skip else [""] * k
@@ -322,6 +326,14 @@ def _is_complete(named: Sequence[HeadingMatch]) -> bool:
 def _channels(named: HeadingMatch) -> set[str]:
     """Channels of an IMU that names identify."""
     return {c.partition("=")[0] for c in named.columns}
+
+
+def _without(table: Array, numbers: Sequence[int]) -> Array:
+    """A table (n, k) with nan in some columns."""
+    out = table.copy()
+    if len(out):
+        out[:, list(numbers)] = np.nan
+    return out
 
 
 def _known(named: Sequence[HeadingMatch], way: Heading | None) -> dict[int, str]:

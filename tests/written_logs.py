@@ -181,6 +181,10 @@ FORMS: dict[str, Writer] = {
     "a word before each row": lambda: each(
         "IMU:{:.3f},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}", T, A, W
     ),
+    "a time with a colon before each row": lambda: each(
+        "{:.0f}: {:.6g}, {:.6g}, {:.6g}, 27.31, {:.6g}, {:.6g}, {:.6g}",
+        np.round(T * 1e6) + 99, A, W,
+    ),
     "a word before each row, and others between": lambda: each(
         "$RAW: {:.3f};{:.6g};{:.6g};{:.6g};{:.6g};{:.6g};{:.6g}\nBAT:{:.3f};3.98;77",
         T, A, W, T,

@@ -126,3 +126,24 @@ def test_a_temperature_in_a_line_of_its_own_is_read(tmp_path: Path, warm: str) -
     (block,) = read(tmp_path, lines, timed=False).values()
     np.testing.assert_allclose(block.temperature, 31.047)
     np.testing.assert_allclose(block.acc, FORCE)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "LSM6DSL [acc/mg]:  {:.3f}, {:.3f}, {:.3f}\n"
+        "LSM6DSL [gyro/mdps]: {:.3f}, {:.3f}, {:.3f}",
+        "Accel data [milli g] - X: {:.3f}   Y: {:.3f}   Z: {:.3f}\n"
+        "Gyro data [mdps] - X: {:.3f}   Y: {:.3f}   Z: {:.3f}\nCompass [uT] - X: 1",
+        "I/imu: accel({:.3f}, {:.3f}, {:.3f}) mg, gyro({:.3f}, {:.3f}, {:.3f}) mdps",
+    ],
+    ids=["mbed", "RIOT", "RT-Thread"],
+)
+def test_units_that_stand_in_a_label_are_those_of_its_values(
+    tmp_path: Path, form: str
+) -> None:
+    values = np.hstack([FORCE / 9.80665 * 1e3, np.rad2deg(RATES) * 1e3])
+    lines = "\n".join(form.format(*row) for row in values).split("\n")
+    (block,) = read(tmp_path, lines, timed=False).values()
+    np.testing.assert_allclose(block.acc, FORCE, atol=1e-4)
+    np.testing.assert_allclose(block.gyr, RATES, atol=1e-6)

@@ -6,6 +6,8 @@ accel x,y,z: 0.1, 0.2, 9.8         accel x: 0.1 y: 0.2 z: 9.8
 acc_xyz: 0.1, 0.2, 9.8             acc: 0.1, 0.2, 9.8
 accel 0.1 0.2 9.8 m/s/s            accel: 0.1 0.2 9.8 m/s/s
 ax: 0.1 (m/s²) ay: 0.2 (m/s²)      ax: 0.1 m/s², ay: 0.2 m/s²,
+LSM6DSL [acc/mg]: 10, -2, 999      LSM6DSL acc [mg]: 10, -2, 999
+accel(0.1, 0.2, 9.8)               accel: 0.1, 0.2, 9.8
 accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}       Acc (mg) [ 10.1, -2.3, 999.1 ]
 """
 
@@ -23,9 +25,16 @@ MAX_UNIT_LETTERS = 18
 
 _LIST = re.compile(rf"(?<=[:=])\s*[\[({{<]\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*[\])}}>]")
 _LISTED = re.compile(
-    rf"(\([^()]*\)|[A-Za-z])\s*\[\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*\]"
+    rf"(\([^()]*\)|[A-Za-z])\s*(?:\[\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*\]"
+    rf"|\(\s*({NUMBER}(?:[\s,;]+{NUMBER}){{2}})\s*\))"
 )
 """Values in a list right behind a label or its unit in brackets."""
+
+_WITH_UNIT = re.compile(r"\[([A-Za-z]+)/([^\[\]/]+)\](?=\s*[:=])")
+"""What is measured and its unit, within brackets."""
+
+_FROM_AXIS = re.compile(r"([)\]])\s+-\s+(?=[xyzXYZ]\s*[:=])")
+"""A dash between a unit in brackets and the first axis."""
 
 _DICT = re.compile(
     r"[{(]\s*"
@@ -81,12 +90,13 @@ def plain_labels(line: str) -> str:
     >>> plain_labels("gx, gy, gz : 1, 2, 3 dps"), plain_labels("Acc (mg) [ 1, 2, 3 ]")
     ('gx: 1 gy: 2 gz: 3 dps', 'Acc (mg): 1, 2, 3')
     """
+    line = _FROM_AXIS.sub(r"\1 ", _WITH_UNIT.sub(_unit_apart, line))
     line = _NAMES.sub(_pairs, line)
     line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
     line = _SPACED.sub(r"\1: \2 \3: \4 \5: \6", line)
     line = _OVER_AXES.sub(r"\1:", line)
     line = _BEHIND.sub(_bare_unit, line)
-    line = _LISTED.sub(r"\1: \2", line)
+    line = _LISTED.sub(lambda said: f"{said[1]}: {said[2] or said[3]}", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
     three = _THREE.fullmatch(line)
     line = (
@@ -101,6 +111,11 @@ def _pairs(said: re.Match[str]) -> str:
     if len(names) != len(values):
         return said[0]
     return " ".join(map("{}: {}".format, names, values)) + " "
+
+
+def _unit_apart(said: re.Match[str]) -> str:
+    """What is measured, with its unit alone in brackets."""
+    return f"{said[1]} [{said[2]}]" if parse_unit(said[2]) else said[0]
 
 
 def _bare_unit(said: re.Match[str]) -> str:

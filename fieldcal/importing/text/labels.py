@@ -65,6 +65,7 @@ LEVEL = re.compile(
     r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:,-]*"
     r"|\s*[\[(](?i:debug|info|warning|warn|error|trace)[\])][\s:,-]*"
     r"|\s*(?:debug|info|warning|warn|error|trace)(?:\([\w.]*\))?:\s+(?=[A-Za-z])"
+    r"|\s*[EWIDV]/[\w.-]+:\s+(?=[A-Za-z])"
 )
 """What programs write behind the time of a line."""
 

@@ -16,8 +16,10 @@ _CHECKED = re.compile(r"\s*[$!]?([^*]*)\*([0-9A-Fa-f]{2})\s*")
 _ENTRY = re.compile(r"(\s*)(?:- )?([A-Za-z_]\w*):\s*(\S*)\s*")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
-_WORD_BEFORE = re.compile(r"\s*\$?([A-Za-z_]\w*):\s*([-+.\d][^:=]*[,;\s][^:=]*)")
-"""A word before numbers, of which no other has a name."""
+_WORD_BEFORE = re.compile(
+    r"\s*\$?([A-Za-z_]\w*:|\d+(?:\.\d+)?:(?=\s))\s*([-+.\d][^:=]*[,;\s][^:=]*)"
+)
+"""A word, or a time, before numbers of which no other has a name."""
 
 END_MARK = ";"
 """At the end of a line, as programs in C end theirs."""
@@ -81,7 +83,7 @@ class EndedLines(TextForm):
 
 
 class WordPrefix(TextForm):
-    """Lines ``IMU:0.1,0.2,9.8,0,0,0``: the word is a cell as the others are."""
+    """Lines ``IMU:0.1,0.2,9.8,0,0,0``: what stands before is a cell as the others."""
 
     def __init__(self, separator: str) -> None:
         self._separator = separator
@@ -99,7 +101,9 @@ class WordPrefix(TextForm):
 
         def one(line: str) -> str:
             said = _WORD_BEFORE.fullmatch(line)
-            return line if said is None else f"{said[1]}{self._separator}{said[2]}"
+            if said is None:
+                return line
+            return f"{said[1].removesuffix(':')}{self._separator}{said[2]}"
 
         return lambda lines: [one(line) for line in lines]
 

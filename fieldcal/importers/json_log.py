@@ -29,6 +29,7 @@ from fieldcal.importing.records.cut_json import (
     without_last_commas,
 )
 from fieldcal.importing.records.json_lists import json_lists
+from fieldcal.importing.records.record_stream import records_in_turn
 from fieldcal.importing.text.text_form import MOSTLY
 from fieldcal.importing.times.clock_text import is_clock
 from fieldcal.importing.times.said_rate import named_scalars
@@ -39,6 +40,8 @@ BEGINS = re.compile(
     rb"\s*(?:\xef\xbb\xbf)?\s*(?:\{\s*[\"']|\[\s*(?:[\[{]|[-+.\d]+\s*,))"
 )
 
+
+CUT_OFF = "is cut off behind its last whole record"
 
 CLOCK = "time"
 """Name of a time that stands before a record."""
@@ -107,13 +110,17 @@ class JsonLog(ArrayFile):
                 return json.loads(one(text))
             except (ValueError, RecursionError):
                 pass
+        if (stream := records_in_turn(text)) is not None:
+            if stream.is_cut:
+                self.damaged("its end", CUT_OFF)
+            return stream.records
         if (whole := whole_beginning(text)) is not None:
             try:
                 document = _parse_text(whole)
             except (ValueError, RecursionError):
                 document = None
             if document is not None:
-                self.damaged("its end", "is cut off behind its last whole record")
+                self.damaged("its end", CUT_OFF)
                 return document
         found = []
         for number, line in enumerate(text.splitlines(), 1):
@@ -131,7 +138,8 @@ class JsonLog(ArrayFile):
 
 def _parse_line(line: str) -> Any:
     """Contents of a line; the text before a record is its time or topic."""
-    said = BEFORE.fullmatch(line.strip())
+    line = line.strip().rstrip(",")
+    said = BEFORE.fullmatch(line)
     if said is None or not said[1]:
         return _parse_text(line)
     found = _parse_text(said[2])

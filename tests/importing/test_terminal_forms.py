@@ -40,7 +40,8 @@ def numbers(lines: Sequence[str]) -> Array:
 @pytest.mark.parametrize(
     ("stamp", "separator"),
     [("{} -> ", ","), ("[{}] ", " "), ("[{}] ", ","), ("[2024-05-03 {}] ", "\t"),
-     ("{} ", ","), ("2024-05-03 {} ", ";")],
+     ("{} ", ","), ("2024-05-03 {} ", ";"), ("2024-05-03 {} # ", ","),
+     ("2024-05-03 {} - INFO # ", "\t")],
 )  # fmt: skip
 def test_times_that_a_terminal_writes_before_a_line(stamp: str, separator: str) -> None:
     lines = [stamp.format(f"14:20:{i / 20:06.3f}") + separator.join(values(i))

@@ -78,12 +78,13 @@ CLOCK = "utc time [s]"
 
 _STAMP = r"(\S*\s?\d+:\d\d:\d\d(?:[.,]\d+)?)"
 _ARRIVALS = (
-    re.compile(rf"\s*\[?{_STAMP}\]?\s*->\s*"),
+    re.compile(rf"\s*\[?{_STAMP}\]?\s*(?:->|(?:- [A-Z]+ )?#)\s*"),
     re.compile(rf"\s*\[{_STAMP}\][ \t]*(?=[-+.\d])"),
     re.compile(rf"\s*{_STAMP} +(?=[-+.\d][^\s,;]*[,;\t])"),
 )
-"""Times that monitors write before a line: the Arduino IDE's; Tera Term's, in brackets;
-and CoolTerm's, parted by a space from columns that another sign parts."""
+"""Times that monitors write before a line: the Arduino IDE's, and with # RIOT's pyterm;
+Tera Term's, in brackets; and CoolTerm's, parted by a space from columns that another
+sign parts."""
 
 _ZONED = re.compile(rf"\s*{_STAMP} +[-+](?:0\d|1[0-4]):?(?:00|15|30|45)[,;\t]")
 """A time with its zone, which is no number of the row."""

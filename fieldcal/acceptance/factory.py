@@ -65,36 +65,33 @@ def _factory_checks(
         return of_grade if size == by_grade else "as the recording shows"
 
     if "acc" in measured:
-        yield from _coupling_check(calibration, left)
+        yield from _coupling_check(calibration, left, about, whose)
         yield from _accelerometer_checks(left, about, whose)
     if "gyr" in measured:
         yield from _gyroscope_checks(left, about, whose)
     yield from _warm_up_check(left, measured, whose)
 
 
-def _coupling_check(calibration: Calibration, left: FactoryErrors) -> Iterator[Check]:
-    """NO-GO if the calibration lacks more cross-coupling than it relies on."""
+def _coupling_check(
+    calibration: Calibration,
+    left: FactoryErrors,
+    about: Description,
+    whose: SourceOfSize,
+) -> Iterator[Check]:
+    """Report the assumed cross-coupling; NO-GO if the recording shows far more."""
     shown = calibration.info.get("coupling_left_out")
-    if not shown:
-        return
-    size = abs(shown["value"])
-    if size - CERTAIN * shown["sigma"] > BEYOND * left.cross_coupling:
+    size, sigma = (abs(shown[key]) if shown else 0.0 for key in ("value", "sigma"))
+    if size - CERTAIN * sigma > BEYOND * left.cross_coupling:
         says = (
             f"accelerometer {shown['axis']} feels {100 * size:.2g} ±"
-            f" {100 * shown['sigma']:.1g} % of the force along {shown['of']}, which is"
+            f" {100 * sigma:.1g} % of the force along {shown['of']}, which is"
             f" {G0 * size:.2g} m/s² at 1 g and not in this calibration: the device is"
             f" fastened askew, by about {math.degrees(size):.2g}°, or its axes are not"
             " square; fasten it straight and record again, or estimate cross-coupling"
             " (--cross)"
         )
         yield Check("cross-coupling", False, says)
-
-
-def _accelerometer_checks(
-    left: FactoryErrors, about: Description, whose: SourceOfSize
-) -> Iterator[Check]:
-    """Report the assumed errors of the accelerometers."""
-    if left.cross_coupling:
+    elif left.cross_coupling:
         by = whose("cross_coupling", about.squareness)
         says = (
             f"this relies on axes that are square to ± {100 * left.cross_coupling:.2g}"
@@ -102,6 +99,12 @@ def _accelerometer_checks(
             " cross-coupling from nine positions or more (--cross)"
         )
         yield Check("cross-coupling", None, says)
+
+
+def _accelerometer_checks(
+    left: FactoryErrors, about: Description, whose: SourceOfSize
+) -> Iterator[Check]:
+    """Report the assumed errors of the accelerometers."""
     if left.quadratic:
         by = whose("quadratic", about.quadratic)
         size = 1e3 * left.quadratic * G0

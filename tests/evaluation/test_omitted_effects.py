@@ -355,3 +355,24 @@ def test_offsets_without_a_cause_may_be_angles_by_which_turns_are_off(
     before, after = (found[n]["parameters"]["gyr_scale"] for n in found)
     assert (np.array(after["sigma"]) > 1.2 * np.array(before["sigma"])).all()
     assert (np.abs(off(out, CALM)) < 4).all()
+
+
+def test_cross_coupling_that_the_result_lacks_is_no_go(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A device that is turned by 1.7 degrees about z in its mount."""
+    turn = {"k12": 0.03, "k21": -0.03}
+    profile = device(checked_effect("cross_coupling", turn))
+    tables = {"run": {"procedure": "positions"}, "site": {**SITE, "level_deg": 0.01}}
+    history = "--history", str(tmp_path / "history.db")
+    code, said = solved(profile, tmp_path / "s", capsys, *history, **tables)
+    left = said["coupling_left_out"]
+    assert {left["axis"], left["of"]} == {"x", "y"}
+    assert abs(left["value"]) == pytest.approx(0.03, abs=5 * left["sigma"] + 1e-4)
+    checks = {c["name"]: c for c in said["decision"]["checks"]}
+    assert code == 1 and checks["cross-coupling"]["ok"] is False
+    assert "--cross" in checks["cross-coupling"]["says"]
+    _, whole = solved(profile, tmp_path / "c", capsys, "--cross", *history, **tables)
+    names = [c["name"] for c in whole["decision"]["checks"]]
+    assert "coupling_left_out" not in whole and "cross-coupling" not in names
+    assert np.abs(off(whole, profile)).max() < 4.5

@@ -79,8 +79,8 @@ def _coupling_check(
     whose: SourceOfSize,
 ) -> Iterator[Check]:
     """Report the assumed cross-coupling; NO-GO if the recording shows far more."""
-    shown = calibration.info.get("coupling_left_out")
-    size, sigma = (abs(shown[key]) if shown else 0.0 for key in ("value", "sigma"))
+    shown = calibration.info.get("coupling_left_out", {"value": 0.0, "sigma": 0.0})
+    size, sigma = abs(shown["value"]), shown["sigma"]
     if size - CERTAIN * sigma > BEYOND * left.cross_coupling:
         says = (
             f"accelerometer {shown['axis']} feels {100 * size:.2g} ±"

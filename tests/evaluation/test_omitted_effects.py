@@ -363,7 +363,9 @@ def test_cross_coupling_that_the_result_lacks_is_no_go(
     """A device that is turned by 1.7 degrees about z in its mount."""
     turn = {"k12": 0.03, "k21": -0.03}
     profile = device(checked_effect("cross_coupling", turn))
-    tables = {"run": {"procedure": "positions"}, "site": {**SITE, "level_deg": 0.01}}
+    tables: dict[str, Any] = {
+        "run": {"procedure": "positions"}, "site": {**SITE, "level_deg": 0.01},
+    }  # fmt: skip
     history = "--history", str(tmp_path / "history.db")
     code, said = solved(profile, tmp_path / "s", capsys, *history, **tables)
     left = said["coupling_left_out"]

@@ -24,6 +24,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.gram import WeightedGram
+from fieldcal.model.evidence.tridiagonal import is_wide, tridiagonal_gains
 from fieldcal.model.priors import SIZES
 
 MIN_EIGENVALUE = 1e-9
@@ -123,7 +124,27 @@ def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
 
     `own` (...) is the largest diagonal element of T G T before the elimination.
     """
+    if is_wide(rhs):
+        return tridiagonal_gains(inner, rhs)
     return gains_from_eigenvalues(*group_directions(inner, rhs, own))
+
+
+def noticeable_gains(
+    inner: Array, rhs: Array, own: Array, least: Array
+) -> tuple[Index, Index, Array]:
+    """Gains (2) of those groups (n, m, k, k), (n, m, k) that reach `least` (m,).
+
+    Indices of the groups, (g,) and (g,), and their gains (g, sizes). `own` (n, m) are
+    the largest diagonal elements of T G T before the elimination. The largest gain of a
+    group may still be a little below its least one.
+    """
+    if is_wide(rhs):
+        every = tridiagonal_gains(inner, rhs)
+        n, m = np.nonzero(every.max(axis=-1) >= least)
+        return n, m, every[n, m]
+    strength, power = group_directions(inner, rhs, own)
+    n, m = np.nonzero(largest_gains(strength, power) >= least)
+    return n, m, gains_from_eigenvalues(strength[n, m], power[n, m])
 
 
 def group_directions(

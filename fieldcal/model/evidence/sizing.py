@@ -3,9 +3,7 @@
 Once a set is eliminated with sizes v_0, its covariance gives the evidence at any other
 size of one group: with C = U diag(c) U^T the posterior covariance of the group in units
 of its prior covariance, lambda = (1 / c - 1) / v_0^2 and q = U^T u / (c v_0) are those
-of (2) of `eliminated`. The same holds for an instability tau of the means of windows:
-if the information on the means with tau has the eigenvalues s, that without tau has the
-eigenvalues s / (1 - tau^2 s).
+of (2) of `eliminated`. The same holds for an instability of the means of windows, (1).
 """
 
 from __future__ import annotations
@@ -23,6 +21,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.evidence.tridiagonal import tridiagonal_gains
 
 LOG_DENSITY = priors.log_density()
 INSTABILITY_LOG_DENSITY = np.log(priors.density(priors.INSTABILITY_TAIL))
@@ -155,7 +154,7 @@ class Sizing:
         self.places = [slice(a, b) for a, b in pairwise(widths)]
         self.gram = gram.select_columns(self.columns)
         self._states: dict[tuple[int, ...], Eliminated] = {}
-        self._channel_gains: dict[tuple[int, ...], Array] = {}
+        self._gains_by_channel: dict[tuple[int, ...], Array] = {}
 
     def run(self) -> tuple[Sizes, float]:
         """Iterate until no size changes; the sizes, and ln Z summed over them."""
@@ -256,13 +255,14 @@ class Sizing:
 
     def _maximise_channel(self, c: int, channels: Sequence[int]) -> Array:
         """F over the instabilities of one channel; sets it to the maximum."""
-        profile = self._profile_with_prior(c, channels, self._channel_gain(c))
+        (gain,) = self._channel_gains([c])
+        profile = self._profile_with_prior(c, channels, gain)
         self.instability[c] = int(np.argmax(profile))
         return profile
 
     def _maximise_jointly(self, channels: Sequence[int]) -> list[Array]:
         """F over the instabilities of each channel; sets all to the joint maximum."""
-        separate = [self._channel_gain(c) for c in channels]
+        separate = self._channel_gains(channels)
         index = np.arange(len(LOG_DENSITY))
         distance = (
             np.subtract.outer(index, index) * LOG_SIZE_STEP / priors.AXES_LOG_SPREAD
@@ -288,20 +288,29 @@ class Sizing:
         sizes[:, channels.index(c)] = np.arange(len(gain))
         return gain + triad_log_prior(sizes)
 
-    def _channel_gain(self, c: int) -> Array:
-        """Gain over the instabilities of one channel, the others fixed; cached."""
-        key = (c, *self.sizes, *self.instability)
-        if key not in self._channel_gains:
-            self._channel_gains[key] = self._calculate_channel_gain(c)
-        return self._channel_gains[key]
+    def _channel_gains(self, channels: Sequence[int]) -> Array:
+        """Gain over the instabilities of each of some channels, (c, sizes); cached.
 
-    def _calculate_channel_gain(self, c: int) -> Array:
-        """Calculate the gain over the instabilities of one channel."""
-        inner, rhs = self.eliminated().schur_complement_of_means(c)
-        tau = float(priors.SIZES[self.instability[c]] * self.typical_instability[c])
-        information, axes = np.linalg.eigh(inner)
-        information = np.clip(information, 0.0, (1 - MIN_VARIANCE_RATIO) / tau**2)
-        remaining = 1 - tau**2 * information
-        size = float(self.typical_instability[c])
-        power = (axes.T @ rhs / remaining * size) ** 2
-        return gains_from_eigenvalues(information / remaining * size**2, power)
+        The others are fixed. A gain is that over the present instability tau of the
+        channel. With S and r of `schur_complement_of_means` there, another instability
+        v adds v^2 - tau^2 to the variance of each mean,
+
+            gain = [ d r^T (I + d S)^-1 r - ln |I + d S| ] / 2,  d = v^2 - tau^2    (1)
+        """
+        key = (*channels, *self.sizes, *self.instability)
+        if key not in self._gains_by_channel:
+            state = self.eliminated()
+            each = [state.schur_complement_of_means(c) for c in channels]
+            width = max(len(rhs) for _, rhs in each)
+            inner, rhs = (
+                np.zeros((len(each), width, width)),
+                np.zeros((len(each), width)),
+            )
+            for i, (own, right) in enumerate(each):
+                inner[i, : len(right), : len(right)], rhs[i, : len(right)] = own, right
+            typical = self.typical_instability[list(channels)][:, None] ** 2
+            present = priors.SIZES[[self.instability[c] for c in channels]][:, None]
+            more = typical * (priors.SIZES**2 - present**2)
+            gains = tridiagonal_gains(inner, rhs, more, MIN_VARIANCE_RATIO)
+            self._gains_by_channel[key] = gains
+        return self._gains_by_channel[key]

@@ -1,4 +1,4 @@
-"""Gains of all groups of a dictionary in addition to a set, at several instabilities.
+"""All groups of a dictionary in addition to a set, at several instabilities.
 
 All groups with the same number of columns are calculated together, and so are all
 instabilities, which is faster than one by one.
@@ -9,22 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from hashlib import blake2b
 
 import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import EqualWidthGroups
-from fieldcal.model.evidence.eliminated import group_directions
 from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.search.set_at_instability import (
     InstabilityIndices,
     SetAtInstability,
 )
-
-MIN_CACHED_COLUMNS = 30
-"""Number of columns of a group from which its eigenvalues are cached."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,19 +40,20 @@ class WeightedColumns:
 
 
 class GroupGains:
-    """Calculates what all groups add, and caches what several sets need."""
+    """Eliminates a set from all groups, and caches what several sets need."""
 
     def __init__(self, sets: Sets) -> None:
         self._sets = sets
         self._weighted: dict[InstabilityIndices, WeightedColumns] = {}
-        self._wide: dict[bytes, tuple[Array, Array]] = {}
 
     def by_width(
         self, levels: Sequence[SetAtInstability]
-    ) -> Iterator[tuple[EqualWidthGroups, Array, Array]]:
-        """Eigenvalues and q^2 of all groups, (levels, groups, k) each, width by width.
+    ) -> Iterator[tuple[EqualWidthGroups, Array, Array, Array]]:
+        """Matrices M and vectors T b' of (2) of `eliminated` of all groups, by width.
 
-        They are those of (2) of `eliminated`. The levels are those of one set.
+        They are (levels, groups, k, k) and (levels, groups, k). With the largest
+        diagonal element of each T G T before the elimination, (levels, groups). The
+        levels are those of one set.
         """
         weighted = [self._weighted_columns(level.instability) for level in levels]
         gram, of_set = self._sets.gram, levels[0].state.columns
@@ -81,27 +77,7 @@ class GroupGains:
             inner *= typical[:, :, None] * typical[:, None, :]
             top = (np.diagonal(own, 0, 2, 3)[:, block] * typical**2).max(axis=-1)
             rhs = rest[:, alike.blocks[block]] * typical
-            yield alike, *self.directions(inner, rhs, top)
-
-    def directions(self, inner: Array, rhs: Array, own: Array) -> tuple[Array, Array]:
-        """Eigenvalues and q^2 of groups; of wide groups cached by their matrices.
-
-        A group that is not connected with a triad has the same ones at all of its
-        instabilities.
-        """
-        if inner.shape[-1] < MIN_CACHED_COLUMNS:
-            return group_directions(inner, rhs, own)
-        shape, k = rhs.shape, rhs.shape[-1]
-        inner, rhs, own = inner.reshape(-1, k, k), rhs.reshape(-1, k), own.ravel()
-        keys = [
-            _digest(*arrays) for arrays in zip(inner, rhs, own[:, None], strict=True)
-        ]
-        new = {key: i for i, key in enumerate(keys) if key not in self._wide}
-        at = list(new.values())
-        found = group_directions(inner[at], rhs[at], own[at])
-        self._wide.update(zip(new, zip(*found, strict=True), strict=True))
-        strength, power = zip(*(self._wide[key] for key in keys), strict=True)
-        return np.array(strength).reshape(shape), np.array(power).reshape(shape)
+            yield alike, inner, rhs, top
 
     @cached_property
     def _within(self) -> list[Array]:
@@ -119,8 +95,3 @@ class GroupGains:
             weighted = WeightedColumns(rows, rows.rhs(None), blocks)
             self._weighted[instability] = weighted
         return self._weighted[instability]
-
-
-def _digest(*arrays: Array) -> bytes:
-    """Key of some arrays, by their values."""
-    return blake2b(b"".join(a.tobytes() for a in arrays), digest_size=16).digest()

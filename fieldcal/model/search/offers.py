@@ -17,11 +17,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, EqualWidthGroups, Group
 from fieldcal.model.causes.smooth import MAX_COSINES
-from fieldcal.model.evidence.eliminated import (
-    Eliminated,
-    gains_from_eigenvalues,
-    largest_gains,
-)
+from fieldcal.model.evidence.eliminated import Eliminated, noticeable_gains
 from fieldcal.model.evidence.sets import Set, SetKey, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member, Sizes
 from fieldcal.model.search.group_gains import GroupGains
@@ -260,11 +256,10 @@ class Offers:
     ) -> list[BestVariants]:
         """Best variant of every cause at each level of a set."""
         best: list[BestVariants] = [{} for _ in levels]
-        for alike, strength, power in self._gains.by_width(levels):
+        for alike, inner, rhs, top in self._gains.by_width(levels):
             at = alike.cause
             least = MIN_LOG_GAIN - extra_log_odds(alike, log_prior_by_variant)
-            level, number = np.nonzero(largest_gains(strength, power) >= least)
-            gain = gains_from_eigenvalues(strength[level, number], power[level, number])
+            level, number, gain = noticeable_gains(inner, rhs, top, least)
             profile, known = gain + LOG_DENSITY, alike.known[number]
             profile[known] = -np.inf
             profile[known, UNIT_INDEX] = gain[known, UNIT_INDEX]

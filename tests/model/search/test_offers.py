@@ -10,12 +10,8 @@ import pytest
 from small_sessions import Session, ladder
 
 from fieldcal.model import priors
-from fieldcal.model.evidence.eliminated import gains_from_eigenvalues, largest_gains
 from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
-from fieldcal.model.search import offers
-from fieldcal.model.search.group_gains import GroupGains
-from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.selection import PREDICTION_SLACK, Search
 from fieldcal.model.search.variations import visit_variations
 
@@ -86,51 +82,6 @@ def test_what_is_taken_begins_with_the_sizes_that_were_offered(
     assert start.members == (*there.sizes.members, one.size, two.size)
     both = zip(one.instability, two.instability, there.sizes.instability, strict=True)
     assert start.instability == tuple(min(some) for some in both)
-
-
-def test_wide_groups_are_looked_up_where_rows_say_the_same_of_them() -> None:
-    search = drawn()
-    rng = np.random.default_rng(2)
-    root = rng.standard_normal((3, 40, 40))
-    inner = root @ root.swapaxes(1, 2)
-    rhs, own = rng.standard_normal((3, 40)), np.full(3, 80.0)
-    directions = GroupGains(search.sets).directions
-    both = directions(inner, rhs, own)
-    again = directions(inner[::-1], rhs[::-1], own)
-    for one, other in zip(both, again, strict=True):
-        np.testing.assert_array_equal(one, other[::-1])
-    found = gains_from_eigenvalues(*both)
-    assert (found.max(axis=1) <= largest_gains(*both)).all()
-    at = int(np.argmin(np.abs(np.log(priors.SIZES))))
-    v = float(priors.SIZES[at])
-    for i in range(3):
-        scaled = np.linalg.solve(inner[i] + np.eye(40) / v**2, rhs[i])
-        log_det = np.linalg.slogdet(np.eye(40) + v**2 * inner[i])[1]
-        assert found[i, at] == pytest.approx(0.5 * (rhs[i] @ scaled - log_det))
-
-
-@pytest.mark.parametrize("key", ["random_walk:acc", "flicker:acc"])
-def test_what_wanders_far_above_the_noise_is_offered_by_all_its_waves(
-    key: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The quick ones are as far above it; by some, a walk would be flicker or back."""
-    session = Session.of(ladder(8), (key,))
-    ((walk,),) = [c.variants for c in session.dictionary.causes]
-    rng = np.random.default_rng(2)
-    size = 20 * walk.typical * rng.standard_normal(len(walk.columns))
-    off = session.noise(rng) + session.design[:, :, walk.columns] @ size
-
-    def offered() -> Offer:
-        search = session.search(off)
-        (offer,) = search.offers.ranked(search.sets.evaluate(()))
-        return offer
-
-    by_some = offered()
-    monkeypatch.setattr(offers, "MAX_COSINES", 20)
-    by_all, search = offered(), session.search(off)
-    found = search.offers.accept(search.sets.evaluate(()), by_all)
-    assert by_all.score == pytest.approx(found.score, abs=8.0)
-    assert by_all.score > by_some.score + 20
 
 
 JUMPS = Session.of(ladder(), ("bias_step:acc", "bias_step:gyr", "bias_drift:acc"))

@@ -13,6 +13,7 @@ import numpy as np
 
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.grade import Grade
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.diagnosis.factory_left import enlarge_to_shown_grade
@@ -61,6 +62,7 @@ class Explanation:
     best : fit of the best set
     calibration_only : fit of bias and scale factor alone
     posterior : probabilities of all causes
+    grade : grade that bias and scale factor of the best set show
 
     """
 
@@ -69,6 +71,7 @@ class Explanation:
     best: FittedSet
     calibration_only: FittedSet
     posterior: Posterior
+    grade: Grade
 
     @property
     def source(self) -> RowSource:
@@ -217,10 +220,9 @@ def explain(
         prepared.rows, fit.dictionary, windows, found.values,
         average_over_sizes(found.search.sets, found.best),
     )  # fmt: skip
-    enlarge_to_shown_grade(fit.dictionary, best.set, prepared.source.about)
-    return Explanation(
-        prepared, found, best, fit_calibration_only(fit, prepared.rows), posterior
-    )
+    grade = enlarge_to_shown_grade(fit.dictionary, best.set, prepared.source.about)
+    alone = fit_calibration_only(fit, prepared.rows)
+    return Explanation(prepared, found, best, alone, posterior, grade)
 
 
 def _calculate_posterior(found: InferenceResult) -> Posterior:

@@ -14,6 +14,7 @@ import numpy as np
 
 from fieldcal.calibration.grade_evidence import GradeShown
 from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
+from fieldcal.core.grade import Grade
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model.causes.cause import Group
@@ -45,8 +46,11 @@ def factory_error_groups(
 
 def enlarge_to_shown_grade(
     dictionary: Dictionary, best: Set, about: Description
-) -> None:
-    """Enlarge the factory errors to the grade that bias and scale factor show."""
+) -> Grade:
+    """Enlarge the factory errors to the grade that bias and scale factor show.
+
+    Returns that grade.
+    """
     state, nominal = best.state, about.nominal
     sigma = np.sqrt(np.diag(state.inverse))
     names: list[str] = []
@@ -61,7 +65,7 @@ def enlarge_to_shown_grade(
     values, error = np.array(found).reshape(-1, 2).T
     shows = GradeShown.of(about.grade, names, values, error, about.nominal_as_sent)
     if not shows.because:
-        return
+        return shows.grade
     stated, coarser = (factory_errors(about, grade) for grade in (None, shows.grade))
     larger = _groups_with_sizes(dictionary, stated, coarser)
     beside = eliminate_with(best, groups_not_in(best, larger))
@@ -72,6 +76,7 @@ def enlarge_to_shown_grade(
     dictionary.unfitted = _groups_with_sizes(
         dictionary, stated, replace(coarser, **sizes)
     )
+    return shows.grade
 
 
 def _groups_with_sizes(

@@ -15,6 +15,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.grade_evidence import GradeShown
 from fieldcal.calibration.names import TILTS, group_of, sensor_of
 from fieldcal.core.errors import NotObservable
+from fieldcal.core.grade import Grade
 from fieldcal.evaluation.angle_setting import with_shown_angle_setting
 from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.level_check import with_tilt_shown
@@ -33,6 +34,7 @@ from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
+from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.words import RECORD_TURNS
 
 UseTurns = Literal["auto", "yes", "no"]
@@ -75,27 +77,15 @@ def solve_prepared(
     """Solve a prepared session; parameters and errors as of `solve_session`."""
     options = _with_defaults(prepared, options)
     device = replace(prepared.session.about, **(left or {}))
-    options["factory"] = factory_errors(device)
     if options.get("as_printed"):
+        options["factory"] = factory_errors(device)
         return _with_warnings(
             solve(prepared.observations, **options), prepared, turns, []
         )
-    shown = prepared.explanation
+    shown, stated = prepared.explanation, options["angle_sigma_deg"]
     recorded = prepared.recorded_rows(turns != "no", shown)
 
-    def fit() -> Calibration:
-        return solve(prepared.observations, recorded=recorded, **options)
-
-    stated = options["angle_sigma_deg"]
-    calibration, notes = with_shown_angle_setting(fit, options, shown)
-    shows = _shown_grade(calibration, prepared.session.about)
-    if shows.because:
-        options["at_best"] = options["factory"]
-        options["factory"] = factory_errors(device, shows.grade)
-        calibration = fit()
-        calibration = replace(
-            calibration, info={**calibration.info, "grade_shown": asdict(shows)}
-        )
+    calibration, notes = _at_shown_grade(prepared, recorded, device, options)
     calibration = with_tilt_shown(calibration, prepared.observations, recorded, options)
     calibration = _with_warnings(
         calibration, prepared, turns, [*notes, *prepared.sample_warnings]
@@ -115,6 +105,44 @@ def solve_prepared(
     )
     calibration = with_impossible_scales(shown, calibration)
     return with_description_faults(shown.prepared, calibration)
+
+
+def _at_shown_grade(
+    prepared: PreparedSession,
+    recorded: RecordedRows | None,
+    device: Description,
+    options: dict[str, Any],
+) -> tuple[Calibration, list[str]]:
+    """The calibration with what the grade that it shows leaves in a device; notes.
+
+    What a grade leaves widens the result by which the grade is judged, so the grade is
+    the one that its own result shows. That of the explanation is nearly always right.
+    `options` get the uncertainty of angles and the errors that were taken.
+    """
+    shown, stated = prepared.explanation, options["angle_sigma_deg"]
+
+    def fit() -> Calibration:
+        return solve(prepared.observations, recorded=recorded, **options)
+
+    for grade in dict.fromkeys([shown.grade if shown else device.grade, device.grade]):
+        options |= {"angle_sigma_deg": stated, **_factory_options(device, grade)}
+        calibration, notes = with_shown_angle_setting(fit, options, shown)
+        shows = _shown_grade(calibration, prepared.session.about)
+        if shows.grade == grade:
+            break
+    else:
+        options |= _factory_options(device, shows.grade)
+        calibration = fit()
+    if shows.because:
+        info = {**calibration.info, "grade_shown": asdict(shows)}
+        calibration = replace(calibration, info=info)
+    return calibration, notes
+
+
+def _factory_options(device: Description, grade: Grade) -> dict[str, Any]:
+    """Arguments of `solve` for a device that shows a grade."""
+    stated, shown = factory_errors(device), factory_errors(device, grade)
+    return {"factory": shown, "at_best": None if grade == device.grade else stated}
 
 
 def _with_defaults(

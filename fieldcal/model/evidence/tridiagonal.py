@@ -27,7 +27,7 @@ PIVOTS_PER_LOGARITHM = 8
 BLOCK = 32
 """Columns that LAPACK reduces together; its work space is for so many."""
 
-MIN_WIDTH, MIN_COLUMNS = 9, 27
+MIN_WIDTH, MIN_COLUMNS = 16, 40
 """Least width of groups, and least number of columns of all of them, for which this is
 faster."""
 

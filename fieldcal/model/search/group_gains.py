@@ -61,17 +61,13 @@ class GroupGains:
         halves, rests = [], []
         for columns, level in zip(weighted, levels, strict=True):
             shared = columns.rows.rows_of(of_set, within)
-            halves.append(level.state.half @ shared)
+            halves.append(shared.T @ level.state.half.T)  # rows are read as they lie
             rests.append(columns.rhs - shared.T @ level.state.estimate)
-        half, rest = np.stack(halves), np.stack(rests)
-        square = np.einsum("lac,lac->lc", half, half)
+        rest = np.stack(rests)
         for w, alike in enumerate(self._sets.dictionary.groups_by_width):
             own = np.stack([columns.blocks[w] for columns in weighted])
-            if alike.blocks.shape[1] == 1:
-                taken = square[:, alike.blocks, None]
-            else:
-                part = np.moveaxis(half[:, :, alike.blocks], 1, 2)  # (l, b, a, k)
-                taken = np.swapaxes(part, 2, 3) @ part
+            parts = (half[alike.blocks] for half in halves)  # (b, k, a)
+            taken = np.stack([part @ np.swapaxes(part, 1, 2) for part in parts])
             typical, block = alike.typical, alike.block
             inner = (own - taken)[:, block]
             inner *= typical[:, :, None] * typical[:, None, :]

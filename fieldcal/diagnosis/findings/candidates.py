@@ -20,6 +20,10 @@ from fieldcal.physics.effect import Scatter
 LARGEST_LOG_ODDS = 40.0
 """Largest log odds that are stated."""
 
+LEAST_LOSS = 1e-6
+"""Least rise of the held-out rms, of all of it, that counts: a candidate whose most
+probable size is none predicts as well as nothing does, but for rounding errors."""
+
 PREDICTED_LOSERS = 1
 """Rejected effects whose predictions are calculated: each needs a fit per position."""
 
@@ -53,7 +57,7 @@ def tried_candidates(
             why = _reason_rejected(id_, explanation, offer, beside.get(id_))
         if accepted is None and offer is not None and id_ in followed:
             gain = _held_out_gain_alone(explanation, offers.accept(nothing, offer))
-            if gain < 0:
+            if gain < -LEAST_LOSS:
                 why = f"what it was not fitted to it predicts worse; {why}"
         bic = delta - width * float(np.log(rows))
         sure, chosen = posterior.probability([id_]), accepted is not None

@@ -89,12 +89,15 @@ class LinearRows:
 
     def _product(self, a: Array, mean_a: Array, b: Array, mean_b: Array) -> Array:
         """Products of two designs (r, ...), about their means in windows (w, ...)."""
+        if len(self.starts) == len(self.rows):  # no row differs from its mean
+            return np.zeros((a.shape[1], b.shape[1]))
         out: Array = a.T @ b
         out -= (mean_a * self.info[:, None]).T @ mean_b
         return out
 
     def window_means(self, white: Array) -> Array:
         """Weighted mean of each window, (w, ...), of whitened rows (r, ...)."""
-        inside = self.windows[:, None] == self.window
-        share: Array = inside * self.weight / self.info[:, None]
-        return share @ white
+        wide = (-1, *[1] * (white.ndim - 1))
+        total = np.add.reduceat(white * self.weight.reshape(wide), self.starts, axis=0)
+        out: Array = total / self.info.reshape(wide)
+        return out

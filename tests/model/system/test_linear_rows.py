@@ -41,3 +41,16 @@ def test_a_mean_is_weighted_with_the_inverse_variances(
             np.average(values[own], axis=0, weights=share),
             rtol=1e-12,
         )
+
+
+def test_courses_are_the_rows_about_the_means_of_their_windows(
+    rows: LinearRows,
+) -> None:
+    """Of single rows, each its window's mean, nothing is left."""
+    about = rows.design.copy()
+    for i, window in enumerate(rows.windows):
+        own = window == WINDOW
+        about[own] -= rows.weight[own, None] * rows.means[i]
+    np.testing.assert_allclose(rows.courses, about.T @ about, atol=1e-12)
+    first = np.isin(np.arange(10), rows.starts)
+    assert not rows.select_rows(first).courses.any()

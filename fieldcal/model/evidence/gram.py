@@ -12,7 +12,6 @@ derivative by free rotations.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -67,10 +66,6 @@ class Gram:
             self, within=self.within.select(at), rhs=self.rhs[at],
             means=self.means[:, :, at], index=index,
         )  # fmt: skip
-
-    def blocks(self, columns: Sequence[Index]) -> list[Array]:
-        """Blocks of `within`, which do not depend on the instability."""
-        return [self.within.diagonal_parts(self.index[at]) for at in columns]
 
     def select_windows(self, windows: Mask, info: Array) -> Gram:
         """Some windows, with other information on their means."""
@@ -148,23 +143,21 @@ class WeightedGram:
     root: Array
     log_det: float
 
-    @cached_property
-    def white(self) -> Array:
-        """Whitened means of the columns, for measured channels, (r, k)."""
-        known = self.gram.info > 0
+    def whiten(self, means: Array, windows: Index | slice = slice(None)) -> Array:
+        """Means (w, 6, c) of some windows whitened; 0 of channels not measured."""
         if self.root.size:
-            whole: Array = (self.root @ self.gram.means)[known]
+            whole: Array = self.root[windows] @ means
             return whole
-        return self.gram.means[known] * np.sqrt(self.weight[known])[:, None]
+        return means * np.sqrt(self.weight[windows])[..., None]
+
+    def whitened(self, at: Index) -> Array:
+        """Whitened means of columns `at` (c,) of this matrix, (r, c)."""
+        return self.whiten(self.gram.means[:, :, at])[self.gram.info > 0]
 
     @cached_property
     def residual(self) -> Array:
-        """Whitened means of y - h, (r,)."""
-        known = self.gram.info > 0
-        if self.root.size:
-            whole: Array = (self.root @ self.gram.residual[:, :, None])[known, 0]
-            return whole
-        return self.gram.residual[known] * np.sqrt(self.weight[known])
+        """Whitened means of y - h, (p, 6)."""
+        return self.whiten(self.gram.residual[:, :, None])[..., 0]
 
     def among(self, gram: Gram) -> WeightedGram:
         """The same weights for other columns of the same rows."""
@@ -174,44 +167,21 @@ class WeightedGram:
         """Phi^T R^-1 Phi between columns `one` and `other`."""
         rows = self.gram.index[one]
         columns = rows if one is other else self.gram.index[other]
-        white = self.white[:, rows]
+        white = self.whitened(rows)
         out = self.gram.within.part(rows, columns)
         # numpy calculates only half of the product of a matrix with itself
-        out += white.T @ (white if one is other else self.white[:, columns])
+        out += white.T @ (white if one is other else self.whitened(columns))
         return out
 
-    def rows_of(self, columns: Index, within: Array) -> Array:
-        """Phi^T R^-1 Phi between some columns (c,) and all, (c, k).
-
-        `within` (c, k) is what does not depend on the instability.
-        """
-        out: Array = self.white[:, self.gram.index[columns]].T @ self.white
-        out += within
-        return out
-
-    def rhs(self, columns: Index | None) -> Array:
-        """Phi^T R^-1 (y - h) of some columns, or of all."""
-        at = slice(None) if columns is None else self.gram.index[columns]
-        return self.gram.rhs[at] + self.white[:, at].T @ self.residual
-
-    def diagonals(
-        self, blocks: Sequence[Index], within: Sequence[Array]
-    ) -> list[Array]:
-        """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each.
-
-        `within` is `Gram.blocks` of these.
-        """
-        out: list[Array] = []
-        for at, inner in zip(blocks, within, strict=True):
-            white = self.white[:, self.gram.index[at]]
-            means = np.moveaxis(white, 0, 1)  # (m, r, k)
-            out.append(inner + np.swapaxes(means, 1, 2) @ means)
-        return out
+    def rhs(self, columns: Index) -> Array:
+        """Phi^T R^-1 (y - h) of some columns."""
+        at, known = self.gram.index[columns], self.gram.info > 0
+        return self.gram.rhs[at] + self.whitened(at).T @ self.residual[known]
 
     @property
     def square(self) -> float:
         """(y - h)^T R^-1 (y - h)."""
-        return self.gram.square + float(self.residual @ self.residual)
+        return self.gram.square + float((self.residual**2).sum())
 
     def offsets(self, kind: int) -> tuple[Index, Index, Array]:
         """Means that an instability of a kind moves, and by how much for one of 1.

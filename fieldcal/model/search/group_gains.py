@@ -7,36 +7,18 @@ instabilities, which is faster than one by one.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import EqualWidthGroups
-from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.evidence.sets import Sets
+from fieldcal.model.evidence.weighted_columns import SplitColumns, WeightedColumns
 from fieldcal.model.search.set_at_instability import (
     InstabilityIndices,
     SetAtInstability,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class WeightedColumns:
-    """Products of all columns at one instability, for any set.
-
-    Attributes
-    ----------
-    rows : Gram matrix weighted with the instability
-    rhs : (k,) of all columns
-    blocks : Phi^T R^-1 Phi of the blocks of each width
-
-    """
-
-    rows: WeightedGram
-    rhs: Array
-    blocks: list[Array]
 
 
 class GroupGains:
@@ -60,7 +42,7 @@ class GroupGains:
         within = gram.within.rows(gram.index[of_set])
         halves, rests = [], []
         for columns, level in zip(weighted, levels, strict=True):
-            shared = columns.rows.rows_of(of_set, within)
+            shared = columns.beside(of_set, within)
             halves.append(shared.T @ level.state.half.T)  # rows are read as they lie
             rests.append(columns.rhs - shared.T @ level.state.estimate)
         rest = np.stack(rests)
@@ -76,18 +58,14 @@ class GroupGains:
             yield alike, inner, rhs, top
 
     @cached_property
-    def _within(self) -> list[Array]:
-        """What does not depend on the instability, of the blocks of each width."""
+    def _split(self) -> SplitColumns:
+        """All columns, with the blocks of each width."""
         by_width = self._sets.dictionary.groups_by_width
-        return self._sets.gram.blocks([alike.blocks for alike in by_width])
+        return SplitColumns(self._sets.gram, [alike.blocks for alike in by_width])
 
     def _weighted_columns(self, instability: InstabilityIndices) -> WeightedColumns:
         """Products of all columns at one instability; cached."""
         if instability not in self._weighted:
             rows = self._sets.gram_at(instability)
-            by_width = self._sets.dictionary.groups_by_width
-            columns = [alike.blocks for alike in by_width]
-            blocks = rows.diagonals(columns, self._within)
-            weighted = WeightedColumns(rows, rows.rhs(None), blocks)
-            self._weighted[instability] = weighted
+            self._weighted[instability] = WeightedColumns(self._split, rows)
         return self._weighted[instability]

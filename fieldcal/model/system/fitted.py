@@ -99,9 +99,8 @@ def estimates_by_column(state: Eliminated, dictionary: Dictionary) -> Array:
     np.add.at(out, state.columns, state.estimate)
     if dictionary.unoriented.any() and state.rows.root.size:
         gram, at = state.rows.gram, state.rows.gram.index[state.columns]
-        left = np.zeros(gram.info.shape)
-        left[gram.info > 0] = (
-            state.rows.residual - state.rows.white[:, at] @ state.estimate
+        left = state.rows.residual - state.rows.whiten(gram.means[:, :, at]) @ (
+            state.estimate
         )
         for j, p in enumerate(dictionary.window_positions):
             if dictionary.unoriented[j]:

@@ -20,6 +20,7 @@ from fieldcal.model.evidence.eliminated import (
     gains_from_eigenvalues,
     largest_gains,
 )
+from fieldcal.model.evidence.weighted_columns import SplitColumns, WeightedColumns
 from fieldcal.model.priors import SIZES
 from fieldcal.model.system.linear_system import gram
 
@@ -42,14 +43,12 @@ def test_information_is_that_of_the_rows(seed: int, free: tuple[int, ...]) -> No
     rows, every = one.gram.with_instability(TAU), np.arange(WIDTH)
     inner, rhs = one.dense.information()
     assert_agree(rows.matrix(every, every), inner[:WIDTH, :WIDTH])
-    within = one.gram.within.rows(SET)
-    assert_agree(rows.rows_of(SET, within), inner[SET])
-    assert_agree(rows.rhs(SET), rhs[SET])
-    assert_agree(rows.rhs(None), rhs)
     blocks = [np.array([[0, 1], [5, 2]]), np.array([[8]])]
-    for at, found in zip(
-        blocks, rows.diagonals(blocks, one.gram.blocks(blocks)), strict=True
-    ):
+    columns = WeightedColumns(SplitColumns(one.gram, blocks), rows)
+    assert_agree(columns.beside(SET, one.gram.within.rows(SET)), inner[SET])
+    assert_agree(rows.rhs(SET), rhs[SET])
+    assert_agree(columns.rhs, rhs)
+    for at, found in zip(blocks, columns.blocks, strict=True):
         for block, there in zip(at, found, strict=True):
             assert_agree(there, inner[np.ix_(block, block)])
 
@@ -215,7 +214,7 @@ def test_what_is_known_before_is_as_rows_beside_those_of_the_recording(
     rhs = whole.T @ np.linalg.solve(more, y)
     weighted, every = one.gram.with_instability(TAU), np.arange(WIDTH)
     assert_agree(weighted.matrix(every, every), inner[:WIDTH, :WIDTH])
-    assert_agree(weighted.rhs(None), rhs)
+    assert_agree(weighted.rhs(every), rhs)
     assert weighted.square == pytest.approx(y @ np.linalg.solve(more, y), rel=1e-9)
     assert weighted.log_det == pytest.approx(plain.gram.with_instability(TAU).log_det)
 

@@ -108,7 +108,7 @@ def _squares(
     rows = gram(linear, d, real.values, (), some)
     tau = real.sets.instability_sigma(real.set.sizes.instability)
     weighed = rows.with_instability(tau)
-    inner, rhs = weighed.matrix(columns, columns), weighed.rhs(columns)
+    inner, rhs = weighed.normal_equations(columns)
     left = weighed.square - 2 * values @ rhs + values @ inner @ values
     return chi2_of_uncertain_prediction(
         float(left), rhs - inner @ values, inner, covariance

@@ -56,12 +56,13 @@ class Eliminated:
     @classmethod
     def of(cls, rows: WeightedGram, columns: Index, sizes: Array) -> Eliminated:
         """Eliminate columns with prior standard deviations `sizes`."""
-        scaled = rows.matrix(columns, columns) * sizes
+        scaled, rhs = rows.normal_equations(columns)
+        scaled *= sizes
         scaled *= sizes[:, None]
         scaled.flat[:: len(columns) + 1] += 1.0
         root = cholesky_root(scaled)
         half = triangular_inverse(root) * sizes
-        projected = half @ rows.rhs(columns)
+        projected = half @ rhs
         score = 0.5 * (float(projected @ projected) - rows.square - rows.log_det)
         score -= float(np.log(np.diag(root)).sum())  # (1)
         return cls(rows, columns, sizes, half, half.T @ projected, score)
@@ -87,10 +88,10 @@ class Eliminated:
     def schur_complement(self, columns: Index, typical: Array) -> tuple[Array, Array]:
         """M and T b' of further columns after elimination, in typical sizes."""
         shared = self.rows.matrix(self.columns, columns)
-        inner = self.rows.matrix(columns, columns)
+        inner, rhs = self.rows.normal_equations(columns)
         taken = self.half @ shared
         inner -= taken.T @ taken
-        rhs = self.rows.rhs(columns) - shared.T @ self.estimate
+        rhs -= shared.T @ self.estimate
         return inner * typical * typical[:, None], rhs * typical
 
     def schur_complement_of_means(self, kind: int) -> tuple[Array, Array]:

@@ -165,18 +165,23 @@ class WeightedGram:
 
     def matrix(self, one: Index, other: Index) -> Array:
         """Phi^T R^-1 Phi between columns `one` and `other`."""
-        rows = self.gram.index[one]
-        columns = rows if one is other else self.gram.index[other]
-        white = self.whitened(rows)
+        if one is other:
+            return self.normal_equations(one)[0]
+        rows, columns = self.gram.index[one], self.gram.index[other]
         out = self.gram.within.part(rows, columns)
-        # numpy calculates only half of the product of a matrix with itself
-        out += white.T @ (white if one is other else self.whitened(columns))
+        out += self.whitened(rows).T @ self.whitened(columns)
         return out
 
     def rhs(self, columns: Index) -> Array:
         """Phi^T R^-1 (y - h) of some columns."""
+        return self.normal_equations(columns)[1]
+
+    def normal_equations(self, columns: Index) -> tuple[Array, Array]:
+        """Phi^T R^-1 Phi and Phi^T R^-1 (y - h) of some columns."""
         at, known = self.gram.index[columns], self.gram.info > 0
-        return self.gram.rhs[at] + self.whitened(at).T @ self.residual[known]
+        white, matrix = self.whitened(at), self.gram.within.part(at, at)
+        matrix += white.T @ white
+        return matrix, self.gram.rhs[at] + white.T @ self.residual[known]
 
     @property
     def square(self) -> float:

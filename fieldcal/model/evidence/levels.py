@@ -121,8 +121,8 @@ def _joint_gram(
     every = np.concatenate([columns, further])
     at = np.delete(np.arange(len(every) + 1), a)
     out = np.empty((len(every) + 1, len(every) + 1))
-    out[np.ix_(at, at)] = rows.matrix(every, every)
-    out[a, at] = out[at, a] = rows.rhs(every)
+    out[np.ix_(at, at)], rhs = rows.normal_equations(every)
+    out[a, at] = out[at, a] = rhs
     out[a, a] = rows.square
     return out, rows.log_det
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.state import State
@@ -40,11 +40,14 @@ class EndValues:
     ----------
     bias : (6, k) of the outputs without force and rate
     slopes : (6, 6, k) of the slope of an output by an input of f and w, (1)
+    sudden : (k,) columns of what began at an instant, as a slip of the device in its
+        mount, which is an event and no property of the device
 
     """
 
     bias: Array
     slopes: Array
+    sudden: Mask
 
     @property
     def bias_scale(self) -> Array:
@@ -52,9 +55,12 @@ class EndValues:
         return np.stack([self.bias, self.slopes[range(6), range(6)]])
 
     def coupling(self, values: Array) -> Array:
-        """Slopes by the other axes of a triad, (6, 6), for values (k,)."""
+        """Slopes by the other axes of a triad, (6, 6), for values (k,).
+
+        What began at an instant is left out.
+        """
         same = np.kron(np.eye(2), np.ones((3, 3)) - np.eye(3))
-        found: Array = same * (self.slopes @ values)
+        found: Array = same * (self.slopes @ np.where(self.sudden, 0.0, values))
         return found
 
 
@@ -63,7 +69,7 @@ def end_values(d: Dictionary, shown: Sequence[WeightedExplanation]) -> EndValues
 
     Columns that do not belong to the explanations have 0.
     """
-    changing = np.zeros(d.width, dtype=bool)
+    changing, sudden = np.zeros((2, d.width), dtype=bool)
     for explanation in shown:
         for cause, group in (*explanation.members, *explanation.possible_members):
             if not isinstance(group.effect, Motion) and (
@@ -71,14 +77,15 @@ def end_values(d: Dictionary, shown: Sequence[WeightedExplanation]) -> EndValues
             ):
                 for each in cause.variants if has_equation(group) else (group,):
                     changing[each.columns] = True
+                    sudden[each.columns] = each.begins_at_instant
     slopes = np.zeros((6, 6, d.width))
     if not changing.any():
-        return EndValues(slopes[0], slopes)
+        return EndValues(slopes[0], slopes, sudden)
     for c in range(6):
         step = DERIVATIVE_STEP * np.eye(6)[c]
         up, down = (_end_outputs(d, changing, s * step) for s in (1.0, -1.0))
         slopes[:, c] = (up - down) / (2 * DERIVATIVE_STEP)  # (1)
-    return EndValues(_end_outputs(d, changing, np.zeros(6)), slopes)
+    return EndValues(_end_outputs(d, changing, np.zeros(6)), slopes, sudden)
 
 
 def _end_outputs(d: Dictionary, changing: Array, felt: Array) -> Array:

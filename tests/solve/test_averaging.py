@@ -37,7 +37,8 @@ def made_set(turned: bool = False, prior: float = 10.0) -> Any:
     group = Group("bias", "acc", np.arange(WIDTH), wide, fixed_size=2.0)
     return SimpleNamespace(
         names=NAMES, column_by_name=AT, width=WIDTH, groups=[group],
-        end_values=EndValues(bias, slopes), options=SimpleNamespace(turned=turned),
+        end_values=EndValues(bias, slopes, np.zeros(WIDTH, dtype=bool)),
+        options=SimpleNamespace(turned=turned),
     )  # fmt: skip
 
 

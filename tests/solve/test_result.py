@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -35,9 +36,10 @@ def estimated(**known: Any) -> ParameterEstimate:
         turned=False, gyr_scale=True, level_deg=None, cross=False, tilt="none",
         factory=FactoryErrors(),
     )  # fmt: skip
+    end = EndValues(np.zeros((6, 1)), np.zeros((6, 6, 1)), np.array([False]))
     given = SimpleNamespace(
         options=options, unoriented=np.zeros(5, dtype=bool), names=("acc_bias.x",),
-        width=1, end_values=EndValues(np.zeros((6, 1)), np.zeros((6, 6, 1))),
+        width=1, end_values=end,
     )  # fmt: skip
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "undetermined": (), "parameter_set": given,
@@ -298,5 +300,9 @@ def test_the_largest_coupling_that_is_left_out_has_its_axes_and_uncertainty() ->
         "axis": "y", "of": "z", "value": pytest.approx(-0.03),
         "sigma": pytest.approx(0.03),
     }  # fmt: skip
+    end = found.parameter_set.end_values
+    found.parameter_set.end_values = replace(end, sudden=np.array([True]))
+    assert largest_coupling_left_out(found) is None
+    found.parameter_set.end_values = end
     slopes[1, 2, 0] = slopes[0, 1, 0] = 0.0
     assert largest_coupling_left_out(found) is None

@@ -90,6 +90,12 @@ SESSIONS = (
         "7.8 sigma: a scale factor that steps with the biases",
     ),
     Session(
+        75101459,
+        ("calibrates itself", "resampled"),
+        "27 sigma: a jump in one window, for which all were taken to be in a hand",
+        of_all=True,
+    ),
+    Session(
         75280182,
         ("device exchanged",),
         "151 sigma: another device with similar biases and 33 times the noise",

@@ -238,17 +238,26 @@ def windows_on_one_grid(
         cuts = grids.starts[(start < grids.starts) & (grids.starts < end)].tolist()
         if cuts:
             parts = list(itertools.pairwise([start, *cuts, end]))
-            errors = np.array([_variance_of_mean(block, grids, *one) for one in parts])
+            noise = _largest_noise(block, parts)
+            errors = np.array([_variance_of_mean(grids, noise, *one) for one in parts])
             least = np.maximum(errors.min(axis=0), 1e-300)
             out[row] = parts[int(np.argmin((errors / least).sum(axis=1)))]
     return out
 
 
-def _variance_of_mean(block: Block, grids: Grids, first: int, last: int) -> Array:
+def _largest_noise(block: Block, parts: Sequence[tuple[int, int]]) -> Array:
+    """Noise of a sample in the part that shows most of it, (6,).
+
+    A coarse grid hides noise, and so do few samples.
+    """
+    six = [np.hstack([block.acc[a:b], block.gyr[a:b]]) for a, b in parts]
+    found: Array = np.max([np.nan_to_num(short_lag_noise(one)) for one in six], axis=0)
+    return found
+
+
+def _variance_of_mean(grids: Grids, sampled: Array, first: int, last: int) -> Array:
     """Variance of the means of samples by their noise and rounding, (6,)."""
     step = grids.within(first, last)
-    six = np.hstack([block.acc[first:last], block.gyr[first:last]])
-    sampled = np.nan_to_num(short_lag_noise(six))
     by_rounding = np.maximum(
         rounding.variance_of_mean(step, sampled),
         rounding.variance_of_few_values(step, sampled),

@@ -12,6 +12,7 @@ from ladder_sessions import tables
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.chain import check_chain
 from fieldcal.physics.grid_stretches import grids_by_stretch, windows_on_one_grid
+from fieldcal.physics.recording import Grids
 from fieldcal.session.description_file import parse_description
 
 FINE, COARSE = 6e-4, 0.036
@@ -64,6 +65,17 @@ def test_of_a_window_the_part_is_kept_that_is_known_better(
     np.testing.assert_array_equal(kept[whole], bounds[whole])
     edge = block.t[kept[3, 1] - 1] if fine else block.t[kept[3, 0]]
     assert edge == pytest.approx(at, abs=0.1)
+
+
+def test_a_single_sample_on_a_grid_of_its_own_is_no_part_of_a_window() -> None:
+    """Of one sample no noise is seen, which does not make it better known."""
+    block = record(TACTICAL, ride(TACTICAL, seed=2))
+    start, end = np.searchsorted(block.t, np.array(windows()))[3].tolist()
+    cut = start + (end - start) // 3
+    steps = np.array([[0.0], [FINE], [0.0]]) * np.array([[1.0] * 3 + [0.0] * 3])
+    grids = Grids(np.array([0, cut, cut + 1]), steps)
+    (kept,) = windows_on_one_grid(block, grids, np.array([[start, end]]))
+    assert kept.tolist() == [cut + 1, end]
 
 
 def test_nothing_stands_still_and_nobody_pushed() -> None:

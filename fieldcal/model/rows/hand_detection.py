@@ -133,7 +133,9 @@ def tremor_rms(values: Array, length: float, white: Array) -> Array:
 def force_wander_angle(rows: Rows) -> float:
     """Rms angle by which the force turns within windows, rad; 0 on a table.
 
-    A course that all windows share is subtracted: outputs that settle make one.
+    A course that all windows share is subtracted: outputs that settle make one. The
+    window that varies most does not count: a hand holds the others as well, and a knock
+    or a jump of a bias is in one.
     """
     x, usable = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
     held = [usable & (x.position == p) for p in np.unique(x.position[usable])]
@@ -141,17 +143,17 @@ def force_wander_angle(rows: Rows) -> float:
     if len(held) < MIN_HELD_WINDOWS:
         return 0.0
     offs = [rows.y[at, :3] - rows.y[at, :3].mean(axis=0) for at in held]
-    along, across, dof, angle = 0.0, 0.0, 0.0, []
+    squares, angle = list[tuple[float, float, float]](), []
     for at, off in zip(held, _without_shared_course(offs), strict=True):
         up = x.f[at][0] / np.linalg.norm(x.f[at][0])
         sd = rows.sd[at, :3]
         part = np.outer(off @ up, up)
         free = (len(off) - 1) * (1 - 1 / len(held))
-        along += float(((part / sd) ** 2).sum())
-        across += float((((off - part) / sd) ** 2).sum())
-        dof += free
+        along, across = ((one / sd) ** 2 for one in (part, off - part))
+        squares.append((float(across.sum()), float(along.sum()), free))
         length = np.linalg.norm(rows.y[at, :3].mean(axis=0))
         angle.append(((off - part) ** 2).sum() / (2 * free) / length**2)
+    across, along, dof = np.sum(sorted(squares, key=lambda s: s[0] / s[2])[:-1], axis=0)
     if across / 2 < max(dof + WANDER_SIGMAS * np.sqrt(dof), ACROSS_RATIO * along):
         return 0.0
     return float(np.sqrt(np.mean(angle)))

@@ -47,6 +47,19 @@ def test_what_scatters_along_the_force_as_well_is_no_hand() -> None:
     assert force_wander_angle(replace(one, y=y)) == 0.0
 
 
+def test_a_jump_in_one_window_is_no_hand() -> None:
+    """A hundred times the noise, which would be a hand if it counted in all of them."""
+    one = held(0.0)
+    y = one.y.copy()
+    inside = np.flatnonzero(one.x.position == 4)
+    y[inside[len(inside) // 2 :], :3] += 100 * SD * np.array([1.0, -1.0, 0.5])
+    assert force_wander_angle(replace(one, y=y)) == 0.0
+    in_hand = held(2e-3)
+    y = in_hand.y.copy()
+    y[inside[len(inside) // 2 :], :3] += 0.1
+    assert force_wander_angle(replace(in_hand, y=y)) > 2e-3
+
+
 def test_a_course_that_windows_share_is_none_of_a_hand() -> None:
     one = held(0.0)
     y = one.y.copy()

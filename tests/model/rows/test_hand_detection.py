@@ -52,7 +52,7 @@ def test_a_jump_in_one_window_is_no_hand() -> None:
     one = held(0.0)
     y = one.y.copy()
     inside = np.flatnonzero(one.x.position == 4)
-    y[inside[len(inside) // 2 :], :3] += 100 * SD * np.array([1.0, -1.0, 0.5])
+    y[inside[len(inside) // 2 :], :3] += 100 * SD[:3] * [1.0, -1.0, 0.5]
     assert force_wander_angle(replace(one, y=y)) == 0.0
     in_hand = held(2e-3)
     y = in_hand.y.copy()

@@ -74,13 +74,18 @@ def spread_points(count: int, points: int = REPRESENTATIVE_POINTS) -> Array:
 def _choices(
     sets: Sets, members: tuple[Member, ...], member: Member
 ) -> tuple[list[tuple[Member, ...]], Array]:
-    """Variants of a cause of a set, and their probabilities."""
+    """Variants of a cause of a set, and their probabilities.
+
+    Each has the axes that the search names: it may have known more, as angles that a
+    fit by the length of the force does not use.
+    """
     cause, group = member
-    if not (has_equation(group) and cause.variants[1:]):
+    shown = [i for i, v in enumerate(cause.variants) if {*group.params} <= {*v.params}]
+    if not (has_equation(group) and shown[1:]):
         return [(member,)], np.ones(1)
-    score = _scores(sets, members, member)
+    score = _scores(sets, members, member)[shown]
     weight: Array = np.exp(score - np.logaddexp.reduce(score))
-    return [((cause, other),) for other in cause.variants], weight
+    return [((cause, cause.variants[i]),) for i in shown], weight
 
 
 def _with_and_without(

@@ -154,7 +154,7 @@ def test_what_is_uncertain_beside_a_cause_does_not_make_it_smaller() -> None:
     as_found, sought = (
         np.mean([off(sizes, seed) for seed in range(4)]) for sizes in ((4.0,), ())
     )
-    assert as_found < 0.7 * sought
+    assert as_found < 0.8 * sought
 
 
 def test_one_that_hardly_can_be_is_left_out_and_so_is_what_the_set_has() -> None:

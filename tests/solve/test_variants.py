@@ -101,20 +101,24 @@ def test_an_unlikely_explanation_has_fewer_variants(
 
 
 def test_choices_are_weighed_by_their_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
-    odds = np.array([1.0, 6.0, 3.0])
+    """Of those with the axes that the search named."""
+    odds = np.array([1.0, 50.0, 6.0, 3.0])
     monkeypatch.setattr(variants, "_scores", lambda *told: np.log(odds) - 1000)
-    monkeypatch.setattr(variants, "has_equation", lambda group: group != "none")
-    cause: Any = SimpleNamespace(variants=("a", "b", "c"))
+    monkeypatch.setattr(variants, "has_equation", lambda group: group.params != ())
+    alone, other, both, every, none = (
+        SimpleNamespace(params=params) for params in ((0,), (1,), (0, 1), (0, 1, 2), ())
+    )
+    cause: Any = SimpleNamespace(variants=(alone, other, both, every))
     search: Any = SimpleNamespace()
     choices: Any = variants._choices
-    made, weight = choices(search, (), (cause, "b"))
-    assert made == [((cause, one),) for one in "abc"]
-    np.testing.assert_allclose(weight, odds / 10)
-    made, weight = choices(search, (), (cause, "none"))
-    assert made == [((cause, "none"),)] and weight.tolist() == [1.0]
-    cause.variants = ("b",)
-    made, weight = choices(search, (), (cause, "b"))
-    assert made == [((cause, "b"),)] and weight.tolist() == [1.0]
+    made, weight = choices(search, (), (cause, alone))
+    assert made == [((cause, one),) for one in (alone, both, every)]
+    np.testing.assert_allclose(weight, [0.1, 0.6, 0.3])
+    made, weight = choices(search, (), (cause, none))
+    assert made == [((cause, none),)] and weight.tolist() == [1.0]
+    cause.variants = (other, every)
+    made, weight = choices(search, (), (cause, every))
+    assert made == [((cause, every),)] and weight.tolist() == [1.0]
 
 
 def test_a_cause_that_may_be_absent_is_weighed_by_its_best_variant(

@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.acceptance.rest_steps import RestStep, Stop, sample_period
 from fieldcal.core.samples import Array, Block, Index
@@ -33,9 +32,6 @@ PARTS = 4
 
 RECORDED = 0.5
 """Least part of the samples of a mean that have to be recorded."""
-
-Edges = NDArray[np.intp]
-"""Numbers of the samples at which windows are cut, (v, parts + 1)."""
 
 WAYS = np.array([(delay, delay + time) for delay in DELAYS for time in AVERAGED])
 """(v, 2) when a mean begins and ends, s after a turn."""
@@ -59,9 +55,10 @@ def steps_before_means(
         mean = np.where(takes, mean, 0.0)
         cut = np.where(takes.any(axis=1), stop.window.t.searchsorted(after), np.inf)
         steps = list(_parts(stop, axes, cut))
+        added = [subtracted] + [subtracted + mean] * PARTS  # (1)
         raw = [
-            RestStep(s.seconds, s.since_turn, s.rates + subtracted + mean * bool(k))
-            for k, s in enumerate(steps)
+            RestStep(s.seconds, s.since_turn, s.rates + more)
+            for s, more in zip(steps, added, strict=True)
         ]
         outputs += stop.enclosed(steps)
         before += stop.enclosed(raw)

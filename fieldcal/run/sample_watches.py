@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.driver import Driver
+from fieldcal.run.direction_watch import DirectionWatch
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.mixed_devices_watch import MixedDevicesWatch
 from fieldcal.run.zero_rates_watch import ZeroRatesWatch
@@ -14,7 +15,7 @@ from fieldcal.windows import Average
 
 
 class SampleWatches:
-    """Watches for a wrong unit, samples of two devices, and rates of zero at rest.
+    """Watches for a wrong unit, two devices, a direction, and rates of zero at rest.
 
     Parameters
     ----------
@@ -25,7 +26,7 @@ class SampleWatches:
 
     def __init__(self, driver: Driver, about: Description) -> None:
         self.units = GyroUnitWatch(about.gravity)
-        self._mixed = MixedDevicesWatch()
+        self._mixed, self._direction = MixedDevicesWatch(), DirectionWatch()
         stated = bool(driver.notes.get("installed")) or about.keeps_gyro_bias
         self._zero_rates = ZeroRatesWatch(about.grade, stated)
         self._said = set[tuple[int, str]]()
@@ -34,6 +35,7 @@ class SampleWatches:
         """Look at a short stretch of samples."""
         self.units.add(piece)
         self._mixed.add(piece)
+        self._direction.add(piece)
 
     def add_rest(self, rates: Array) -> None:
         """Look at rates at rest in a position, (n, 3) rad/s."""
@@ -46,7 +48,7 @@ class SampleWatches:
 
     def new_notices(self, index: int) -> Iterator[str]:
         """What is wrong and was not yet said at the position of this number."""
-        watches = (self.units, self._mixed, self._zero_rates)
+        watches = (self.units, self._mixed, self._direction, self._zero_rates)
         for notice in (watch.notice for watch in watches):
             if notice and (index, notice) not in self._said:
                 self._said.add((index, notice))

@@ -47,25 +47,38 @@ def refuse_direction_alone(
 
     """
     held = [block.between(*span).acc for span in windows if span is not None]
+    said = direction_alone_text(held, float(grids_of(block)[:3].max()))
+    if said:
+        raise InputError(f"{said}; record its raw accelerations")
+
+
+def direction_alone_text(held: Sequence[Array], step: float) -> str:
+    """Sentence if accelerations are a direction; empty if they measure a force.
+
+    Parameters
+    ----------
+    held : samples (n, 3) in each rest, m/s^2
+    step : of the grid on which they lie, m/s^2; 0 without one
+
+    """
     held = [acc for acc in held if len(acc) > ORDER]
     size = np.linalg.norm(np.vstack([*held, np.zeros((0, 3))]), axis=1)
     size = size[np.isfinite(size)]
     if not len(size):
-        return
+        return ""
     usual, scatter = float(np.median(size)), float(size.std())
-    step = float(grids_of(block)[:3].max())
     rounded = ROUNDED * step / np.sqrt(12)  # (1)
     if not 0 < usual or scatter > max(rounded, EXACT * usual):
-        return
+        return ""
     across = float(np.median([_noise_across(acc) for acc in held]))
-    if across > max(ACROSS * scatter, LEAST * usual):
-        raise InputError(
-            f"all accelerations in the windows have the magnitude {usual:.6g} m/s²"
-            f" within {max(scatter, step):.1g} m/s², although they scatter by"
-            f" {across:.1g} m/s² across it: they are the direction of gravity, from a"
-            " filter of the device, without bias and scale factor; record its raw"
-            " accelerations"
-        )
+    if across <= max(ACROSS * scatter, LEAST * usual):
+        return ""
+    return (
+        f"all accelerations at rest have the magnitude {usual:.6g} m/s² within"
+        f" {max(scatter, step):.1g} m/s², although they scatter by {across:.1g} m/s²"
+        " across it: they are the direction of gravity, from a filter of the device,"
+        " without bias and scale factor"
+    )
 
 
 def _noise_across(acc: Array) -> float:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Block
+from fieldcal.run.sample_batches import SampleBatches
 from fieldcal.session.mixed_devices import GIVE_EACH_A_PORT, mixed_samples_text
-
-LOOKED_AT = 200
-"""Samples that are looked at together."""
 
 
 class MixedDevicesWatch:
@@ -21,19 +17,13 @@ class MixedDevicesWatch:
     """
 
     def __init__(self) -> None:
-        self._kept: list[Array] = []
-        self._count = 0
+        self._batches = SampleBatches()
         self.notice = ""
 
     def add(self, block: Block) -> None:
         """Take in the samples that follow; costs nothing once it is noticed."""
-        if self.notice:
+        if self.notice or (six := self._batches.add(block)) is None:
             return
-        self._kept.append(block.six)
-        self._count += len(block.t)
-        if self._count < LOOKED_AT:
-            return
-        said = mixed_samples_text(np.vstack(self._kept))
-        self._kept, self._count = [], 0
+        said = mixed_samples_text(six)
         if said:
             self.notice = f"{said}; end this (q), and {GIVE_EACH_A_PORT}"

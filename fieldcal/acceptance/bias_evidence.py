@@ -27,7 +27,7 @@ from fieldcal.core.samples import Array
 UNBIASED = 0.003
 """Share of gyroscopes of known bias, as of a simulation."""
 
-FOLLOWED, AVERAGED, MEANS = 0.5, 0.25, 0.25
+FOLLOWED_SHARE, UNSEEN_MEAN_SHARE, RECORDED_MEAN_SHARE = 0.5, 0.25, 0.25
 """Shares of devices that follow their bias, and that subtract a mean which was not
 recorded, or was, among those that remove it."""
 
@@ -61,7 +61,7 @@ def removals_by_likelihood(
     """
     averaged = averaged_cases(density)
     kinds = [followed_cases(keeps, density), *np.split(averaged, len(averaged))]
-    shares = [FOLLOWED] + [AVERAGED / len(averaged)] * len(averaged)
+    shares = [FOLLOWED_SHARE] + [UNSEEN_MEAN_SHARE / len(averaged)] * len(averaged)
     blind = [float(kind["blind"][0]) for kind in kinds]
     rivals = [kept_cases(keeps, density, one) for one in blind]
     fits = _Fit.split(steps, density, keeps, [*kinds, *rivals])
@@ -93,7 +93,7 @@ def removals_of_recorded_means(
     ratios = _log_ratio(removed, kept, earth_rate_alone(outputs, density, 0.0))
     for ratio, (begins, ends) in zip(ratios, WAYS, strict=True):
         how = f"as a mean over about {ends - begins:.2g} s after each turn"
-        yield Removal(float(ratio) + np.log(MEANS / len(WAYS)), how)
+        yield Removal(float(ratio) + np.log(RECORDED_MEAN_SHARE / len(WAYS)), how)
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,7 @@ class Stop:
     lost: bool = False
 
     def enclosed(self, steps: Iterable[RestStep]) -> Iterator[RestStep]:
-        """Steps of the window, after and before those of the rest around it."""
+        """Steps of the window, with the rest before and after it."""
         unknown = np.full(len(self.noise), np.nan)
         if self.turned:
             yield RestStep(self.settled, 0.0, unknown, turned=True, lost=self.lost)

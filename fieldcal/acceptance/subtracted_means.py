@@ -24,7 +24,7 @@ from fieldcal.core.samples import Array, Block, Index
 DELAYS = (0.0, 0.25, 0.5, 1.0)
 """Times from the end of a turn until a device takes its mean, s."""
 
-AVERAGED = np.geomspace(0.5, 8.0, 9)
+LENGTHS = np.geomspace(0.5, 8.0, 9)
 """Times over which it takes a mean, s."""
 
 PARTS = 4
@@ -33,7 +33,7 @@ PARTS = 4
 RECORDED = 0.5
 """Least part of the samples of a mean that have to be recorded."""
 
-WAYS = np.array([(delay, delay + time) for delay in DELAYS for time in AVERAGED])
+WAYS = np.array([(delay, delay + time) for delay in DELAYS for time in LENGTHS])
 """(v, 2) when a mean begins and ends, s after a turn."""
 
 
@@ -49,12 +49,12 @@ def steps_before_means(
     subtracted = np.zeros((len(WAYS), len(axes)))
     for stop in stops:
         start = float(stop.window.t[0]) - stop.settled
-        mean, after = sums.means(start + WAYS), start + WAYS[:, 1]
+        mean, after = sums.means_of_spans(start + WAYS), start + WAYS[:, 1]
         ends = float(stop.window.t[-1]) + stop.stays
         takes = stop.turned & (after <= ends)[:, None] & np.isfinite(mean)
         mean = np.where(takes, mean, 0.0)
         cut = np.where(takes.any(axis=1), stop.window.t.searchsorted(after), np.inf)
-        steps = list(_parts(stop, axes, cut))
+        steps = list(_parts(stop, sums, cut))
         added = [subtracted] + [subtracted + mean] * PARTS  # (1)
         raw = [
             RestStep(s.seconds, s.since_turn, s.rates + more)
@@ -77,26 +77,33 @@ class _Sums:
         self._sums = np.vstack([zero, rates.cumsum(axis=0)])
         self._counts = np.vstack([zero, known.cumsum(axis=0)])
 
-    def means(self, spans: Array) -> Array:
+    def sample_at(self, time: float) -> int:
+        """Number of the first sample from an instant on, s."""
+        return int(self._t.searchsorted(time))
+
+    def means_of_spans(self, spans: Array) -> Array:
         """Means over (v, 2) spans of time, (v, a) rad/s; nan where few are recorded."""
-        first, last = self._t.searchsorted(spans).T
-        count = self._counts[last] - self._counts[first]
         least = RECORDED * np.diff(spans) / self._period
+        first, last = self._t.searchsorted(spans).T
+        return self.means(first, last, least)
+
+    def means(self, first: Index, last: Index, least: Array | float = 0.0) -> Array:
+        """Means over samples (v,) each, (v, a) rad/s; nan if not more than `least`."""
+        count = self._counts[last] - self._counts[first]
         total = self._sums[last] - self._sums[first]
         found: Array = np.where(count > least, total / np.maximum(count, 1), np.nan)
         return found
 
 
-def _parts(stop: Stop, axes: Index, cut: Array) -> Iterator[RestStep]:
+def _parts(stop: Stop, sums: _Sums, cut: Array) -> Iterator[RestStep]:
     """Steps of a window that is cut at (v,) samples, and the rest of it into parts."""
     window, period = stop.window, sample_period(stop.window)
     first = np.minimum(cut, len(window)).astype(int)[:, None]
     rest = (len(window) - first) * np.arange(PARTS + 1) // PARTS
     edges = np.hstack([0 * first, first + rest])
-    sums = np.vstack([np.zeros(len(axes)), window.gyr[:, axes].cumsum(axis=0)])
+    start = sums.sample_at(float(window.t[0]))
     for begin, end in zip(edges.T[:-1], edges.T[1:], strict=True):
-        count = (end - begin)[:, None]
-        rates = (sums[end] - sums[begin]) / np.where(count > 0, count, np.nan)
+        rates = sums.means(start + begin, start + end)
         rates[:, np.isnan(stop.noise)] = np.nan
         since = stop.settled + begin[:, None] * period
-        yield RestStep(count * period, since, rates)
+        yield RestStep((end - begin)[:, None] * period, since, rates)

@@ -9,10 +9,10 @@ import pytest
 
 from fieldcal.acceptance.bias_cases import AVERAGES, BiasSpread, kept_cases
 from fieldcal.acceptance.bias_evidence import (
-    AVERAGED,
-    FOLLOWED,
-    MEANS,
+    FOLLOWED_SHARE,
+    RECORDED_MEAN_SHARE,
     UNBIASED,
+    UNSEEN_MEAN_SHARE,
     removals_by_likelihood,
     removals_of_recorded_means,
 )
@@ -51,7 +51,7 @@ def test_rates_that_are_as_likely_before_leave_the_share() -> None:
     rates = stops(2e-4)
     found = list(removals_of_recorded_means(rates, rates, DENSITY, KEEPS))
     assert len(found) == len(WAYS)
-    expected = np.log(MEANS / len(WAYS)) - np.log1p(-UNBIASED)
+    expected = np.log(RECORDED_MEAN_SHARE / len(WAYS)) - np.log1p(-UNBIASED)
     assert [way.log_odds for way in found] == pytest.approx([expected] * len(WAYS))
     assert found[0].how == "as a mean over about 0.5 s after each turn"
 
@@ -69,7 +69,7 @@ def test_rates_that_agree_only_before_are_those_of_a_removal() -> None:
     ratio = float((logs[0] - logs[1])[0])
     assert ratio > 2.0
     (way, *_) = removals_of_recorded_means(outputs, before, DENSITY, KEEPS)
-    share = np.log(MEANS / len(WAYS)) - np.log1p(-UNBIASED)
+    share = np.log(RECORDED_MEAN_SHARE / len(WAYS)) - np.log1p(-UNBIASED)
     assert way.log_odds == pytest.approx(ratio + share)
 
 
@@ -80,7 +80,7 @@ def test_what_nothing_explains_tells_little() -> None:
     for before, scatter in (quiet, loud):
         outputs = moved(before, 20 * scatter)
         (way, *_) = removals_of_recorded_means(outputs, before, DENSITY, KEEPS)
-        sizes.append(way.log_odds - np.log(MEANS / len(WAYS)))
+        sizes.append(way.log_odds - np.log(RECORDED_MEAN_SHARE / len(WAYS)))
     assert 0 < sizes[1] < sizes[0]
 
 
@@ -89,6 +89,8 @@ def test_a_device_follows_its_bias_as_often_as_it_averages_it() -> None:
              for s in stops(2e-4)]  # fmt: skip
     found = list(removals_by_likelihood(alike, DENSITY, KEEPS))
     assert len(found) == 1 + len(AVERAGES)
-    assert pytest.approx(1.0) == FOLLOWED + AVERAGED + MEANS
+    assert (
+        pytest.approx(1.0) == FOLLOWED_SHARE + UNSEEN_MEAN_SHARE + RECORDED_MEAN_SHARE
+    )
     assert "time constant" in found[0].how and "mean over" in found[-1].how
     assert all(way.log_odds < 0 for way in found)

@@ -86,3 +86,13 @@ def test_a_window_shorter_than_the_mean_ends_before_it() -> None:
     for steps in by_window(raw):  # one part, all of it before the cut
         assert [np.isfinite(s.rates[way]).all() for s in steps] == [True] + [False] * 4
     assert len(outputs) == len(raw)
+
+
+def test_a_lost_sample_changes_a_mean_by_little() -> None:
+    held, block, before = recording(0.0, 1.0)
+    block.gyr[np.searchsorted(block.t, held[2].t[0]) - 150] = np.nan
+    stops = stops_at_rest(held, block, noise_of_samples(held, AXES))
+    _, raw = steps_before_means(stops, block, AXES)
+    way = int(np.argmin(np.abs(WAYS - [0.0, 1.0]).sum(axis=1)))
+    last = by_window(raw)[3][-1].rates[way]
+    np.testing.assert_allclose(last, before[-400:].mean(axis=0), atol=2e-6)

@@ -45,6 +45,7 @@ USUAL: Mapping[str, float] = {
 TIMED = (
     *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift", "bias_step"),
     *("settling", "hum", "base_step", "mount_slip", "joint_creep"),
+    *("scale_drift", "scale_step"),
 )
 EQUATIONS = (*USUAL, *TIMED, "sway", "time_delay", "heading_error")
 """Effects with numbers that can be made larger and smaller."""
@@ -99,6 +100,9 @@ def drawn(name: str, rng: np.random.Generator, span: float) -> Values:
             "beta_deg": float(rng.normal(0, 0.1)),
             "tau_s": float(rng.uniform(2.5, 10.0)),
         },
+        "scale_drift": {n: float(rng.normal(0, 2e-3 / span)) for n in "xyz"},
+        "scale_step": {n: float(rng.normal(0, 1e-3)) for n in "xyz"}
+        | {"at_s": float(rng.uniform(0.25, 0.75) * span)},
         "settling": both | {"tau_s": float(rng.uniform(2.5, 10.0))},
         "hum": _along(rng, 5e-3, 4e-4) | {"hz": float(rng.uniform(0.5, 9.0))},
         "time_delay": {"seconds": float(rng.uniform(0.003, 0.03))},

@@ -26,9 +26,10 @@ APART = (
     {"quadratic", "scale_asymmetry", "cubic", "pendulous_products"},
     {
         *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift"),
-        *("bias_step", "base_step", "mount_slip"),
+        *("bias_step", "base_step", "mount_slip", "scale_drift", "scale_step"),
     },
     {"temperature_bias", "temperature_scale"},
+    {"temperature_scale", "scale_drift", "scale_step"},
     {"gyro_scale", "gyro_cross_coupling", "angle_scale", "angle_offset", "sway"},
     {"lever_arm", "time_delay", "sway", "hum"},
     {"settling", "joint_creep"},

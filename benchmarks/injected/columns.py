@@ -54,6 +54,7 @@ def named(
     }
     out = _of_time(found.id, numbers, parts)
     out += _of_force(found.id, force)
+    out += _of_time_and_force(found.id, numbers, parts, force)
     out += _of_temperature(found.id, parts, force)
     if found.id in ANGLES:
         out += list(_of_angles(found.id, parts, about))
@@ -71,6 +72,18 @@ def _of_time(name: str, numbers: Mapping[str, float], parts: Parts) -> Columns:
     if name == "settling":
         return each(np.exp(-parts.since / numbers.get("tau_s", np.inf)))
     return []
+
+
+def _of_time_and_force(
+    name: str, numbers: Mapping[str, float], parts: Parts, force: Array
+) -> Columns:
+    courses = {
+        "scale_drift": parts.t - parts.t[0],
+        "scale_step": (parts.t > numbers.get("at_s", np.inf)).astype(float),
+    }
+    if name not in courses:
+        return []
+    return [at_channel(courses[name] * force[:, c], c) for c in range(3)]
 
 
 def _of_force(name: str, force: Array) -> Columns:

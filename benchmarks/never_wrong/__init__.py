@@ -109,8 +109,8 @@ GROUPED = {
         "sampled and held", "packets out of order", "sensors on two clocks",
         "clock set", "few significant digits",
     ),
-    "gravity's direction alone; a device that calibrates itself": (
-        "gravity's direction alone", "calibrates itself",
+    "gravity's direction alone; a device that calibrates itself; a falling supply": (
+        "gravity's direction alone", "calibrates itself", "supply falls",
     ),
     "two days, two devices or two mountings in one": (
         "two days joined", "device exchanged", "device remounted",

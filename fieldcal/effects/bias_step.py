@@ -30,6 +30,7 @@ class BiasStep(BiasChange):
     params = six("m/s^2", 5e-2, "rad/s", 2e-3)
     shapes = (Shape("at_s", "s", -np.inf, np.inf, "instant"),)
     with_scales = True
+    event = "other calibration"
     covariate = "time"
     seen_in = "time"
     absent = "before the step"

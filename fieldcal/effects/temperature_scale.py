@@ -15,14 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import NO_SHAPE, Param, Sensor
+from fieldcal.physics.effect import NO_SHAPE, OwnForce, Param
 from fieldcal.physics.experience import Experience
 
 
-class TemperatureScale(Sensor):
+class TemperatureScale(OwnForce):
     """Temperature coefficient of the accelerometers' scale factors."""
 
     params = tuple(Param(i, "1/K", 3e-4) for i in "xyz")
@@ -37,9 +35,6 @@ class TemperatureScale(Sensor):
         """Where a thermometer shows a change."""
         return x.warms
 
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """Temperature times force along the output's own axis."""
-        out = np.zeros((len(x), 6, 3))
-        for i in range(3):
-            out[:, i, i] = x.warming * x.f[:, i]
-        return out
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """Temperature less that at the start."""
+        return x.warming

@@ -93,6 +93,10 @@ class Effect(ABC):
     while_moving: ClassVar[bool] = False
     """Whether it shows only where a reference follows the motion moment by moment."""
 
+    event: ClassVar[str] = ""
+    """What happens at its instant, if other effects come of it too: where one of them
+    is, the others are likely, at the same instant."""
+
     one_vector: ClassVar[bool] = False
     """Whether its parameters are components of one vector: it is along one axis, or
     along none in particular. A component that is not seen is no reason for it to be
@@ -229,6 +233,19 @@ class BiasChange(Separable):
     def pattern(self, x: Experience) -> Array:
         """One on each output, by its own parameter."""
         return np.broadcast_to(np.eye(6), (len(x), 6, 6))
+
+
+class OwnForce(Separable):
+    """A change of the accelerometers' scale factors by one course.
+
+    Each has a parameter of its own, named x, y and z.
+    """
+
+    def pattern(self, x: Experience) -> Array:
+        """Force along the axis of each output of the accelerometers."""
+        out = np.zeros((len(x), 6, 3))
+        out[:, range(3), range(3)] = x.f
+        return out
 
 
 class Scatter(Effect):

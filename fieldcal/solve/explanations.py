@@ -18,6 +18,7 @@ from itertools import combinations
 
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS
+from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
@@ -102,13 +103,14 @@ def translate_explanations(
     for explanation in sorted(shown, key=lambda s: s.probability):
         size |= explanation.sizes_by_key
     here = {g: m for g, m in _in_other_dictionary(d, wanted, size)}
-    also = list(_on_other_triad(d, [c for c, _ in here.values()]))
+    also = list(_of_same_events(d, [c for c, _ in here.values()]))
     out: dict[frozenset[Group], WeightedExplanation] = {}
     for key, p in likely.items():
         members = tuple(m for g, m in here.items() if g in key)
         same = frozenset(g for _, g in members)
         before = out[same].probability if same in out else 0.0
-        maybe = tuple(m for m in also if m[0].name in {c.name for c, _ in members})
+        events = {c.event for c, _ in members}
+        maybe = tuple(m for m in also if m[0].event in events)
         out[same] = WeightedExplanation(
             members, before + p / sum(likely.values()), maybe
         )
@@ -226,19 +228,41 @@ def _in_axes_of(d: Dictionary, group: Group) -> tuple[int, ...]:
     return tuple(sorted({names.index(name) for name in same}))
 
 
-def _on_other_triad(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
-    """Effects of one triad, on the other triad: a device often has them on both."""
+def _of_same_events(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
+    """Effects that often come with others: on the other triad, or of the same event."""
     known = {c.key for c in causes}
-    for name in dict.fromkeys(c.name for c in causes if c.kind == "effect"):
-        first = next(c for c in causes if c.name == name)
+    for event in dict.fromkeys(c.event for c in causes if c.kind == "effect"):
+        first = next(c for c in causes if c.event == event)
         group = first.variants[0]
-        if not isinstance(group.effect, Sensor):
+        own = group.effect
+        if not isinstance(own, Sensor):
             continue
-        for part, params in parameter_groups(d, group.effect):
-            other = replace(first, part=part)
-            if part != first.part and params and other.key not in known:
-                every = _group_variants(d, replace(group, part=part, params=params))
-                yield replace(other, variants=tuple(every)), every[0]
+        others = [e for e in catalogue().values() if own.event and e.event == own.event]
+        for effect in others or [own]:
+            for part, params in parameter_groups(d, effect):
+                chance = effect.chance(d.x)
+                other = replace(first, name=effect.id, part=part, chance=chance)
+                if params and other.key not in known and effect.acts_on(d.x):
+                    named = replace(
+                        group, cause=effect.id, part=part, params=params, effect=effect
+                    )
+                    every = _group_variants(d, named)
+                    if effect is not own:
+                        every = list(_of_likely_sizes(every))
+                    yield replace(other, variants=tuple(every)), every[0]
+
+
+def _of_likely_sizes(variants: Sequence[Group]) -> Iterator[Group]:
+    """The variants on all axes, with each of the sizes of a restart.
+
+    Rows that do not show an effect make the smallest size the likeliest one. As none
+    of an event that others show, it is as likely to be large.
+    """
+    axes = max(len(g.params) for g in variants)
+    for v in priors.RESTART_SIZES.tolist():
+        for group in variants:
+            if len(group.params) == axes:
+                yield replace(group, typical=v * group.typical, fixed_size=1.0)
 
 
 def _with_parameters(whole: Group, params: tuple[int, ...]) -> Group:

@@ -66,6 +66,9 @@ def differ(one: Block, other: Block) -> bool:
         ("gravity_error:relative=0.001", [-0.006, -0.0064, 0.0048, 0, 0, 0]),
         ("temperature_bias:ax=0.003,gz=-2e-4", [0.003, 0, 0, 0, 0, -2e-4]),
         ("temperature_scale:y=1e-4", [0, -6.4e-4, 0, 0, 0, 0]),
+        ("scale_drift:x=1e-5,z=-2e-5", [-0.006, 0, -0.0096, 0, 0, 0]),
+        ("scale_step:y=1e-3,at_s=60", [0, -6.4e-3, 0, 0, 0, 0]),
+        ("scale_step:y=1e-3,at_s=160", [0] * 6),
         ("thermal_hysteresis:az=0.5,gx=0.01", [0, 0, 0.005, 1e-4, 0, 0]),
         (
             "warm_up:ay=0.01,gx=1e-3,tau_s=50",

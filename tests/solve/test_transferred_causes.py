@@ -11,6 +11,7 @@ import pytest
 from test_explanations import TIMES, member, seen
 
 from fieldcal.calibration.names import TILTS
+from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.physics.effect import Scatter, Sensor
@@ -155,3 +156,29 @@ def test_where_gyroscopes_were_measured_they_may_drift_with_the_accelerometers()
         ParameterSetOptions(), [WeightedExplanation(tuple(both), 1.0)],
     )  # fmt: skip
     assert again.explanations[0].possible_members == (), "both are there already"
+
+
+def test_what_comes_of_the_same_event_is_possible_with_sizes_of_a_restart() -> None:
+    """On all axes, at the instant that rows of another effect show."""
+    rows = rows_of_observations(seen())
+    x = replace(rows.rows.x, since_start=TIMES)
+    cause, group = member("bias_step", (0,))
+    d = ParameterSet(
+        replace(rows.rows, x=x), np.ones(6), rows.since_turn, False,
+        ParameterSetOptions(), [WeightedExplanation(((cause, group),), 1.0)],
+    )  # fmt: skip
+    (one,) = d.explanations
+    scale = next(c for c, _ in one.possible_members if c.name == "scale_step")
+    assert scale.chance == catalogue()["scale_step"].chance(x)
+    assert {g.params for g in scale.variants} == {(0, 1, 2)}
+    at = [g for g in scale.variants if g.shape == group.shape]
+    sizes = 3e-3 * priors.RESTART_SIZES
+    found = sorted(float(g.own_sigma()[0]) for g in at)
+    np.testing.assert_allclose(found, sizes)
+    other = WeightedExplanation((member("bias_drift"),), 1.0)
+    calm = ParameterSet(
+        replace(rows.rows, x=x), np.ones(6), rows.since_turn, False,
+        ParameterSetOptions(), [other],
+    )  # fmt: skip
+    (one,) = calm.explanations
+    assert all(c.name == "bias_drift" for c, _ in one.possible_members)

@@ -129,6 +129,11 @@ class Group:
         return [g for g in others if (g.origin, g.position, g.shape) == own]
 
     @property
+    def event(self) -> str:
+        """What happens when it begins: its effects come together."""
+        return (self.effect.event if self.effect else "") or self.cause
+
+    @property
     def begins_at_instant(self) -> bool:
         """Whether its shape is the instant at which the effect begins."""
         shapes = self.effect.shapes if self.effect and self.shape else ()
@@ -180,12 +185,12 @@ class Cause:
     """Cached results of `simultaneous_variants`."""
 
     def simultaneous_variants(self, other: Group) -> tuple[Group, ...]:
-        """Variants that begin at the same instant as a group on the other triad.
+        """Variants that begin at the same instant as a group of the same event.
 
-        These are the variants with the nearest instant. Empty if the group is of
-        another effect, or of one that does not begin at an instant.
+        These are the variants with the nearest instant. Empty if the group is of an
+        effect with which this one does not come, or that does not begin at an instant.
         """
-        if other.cause != self.name or not other.begins_at_instant:
+        if other.event != self.event or not other.begins_at_instant:
             return ()
         if other not in self._nearest:
             distances = [g.shape_distance(other) for g in self.variants]
@@ -233,6 +238,11 @@ class Cause:
         ]
         variants = (*self.variants, *within)
         return replace(self, variants=variants, expected=frozenset(within))
+
+    @property
+    def event(self) -> str:
+        """What happens when it begins; its own name if no other effect comes of it."""
+        return self.variants[0].event if self.variants else self.name
 
     @property
     def usual(self) -> bool:

@@ -91,10 +91,10 @@ def variant_log_priors(cause: Cause, others: Iterable[Member]) -> Array:
     """Log prior probability of a cause, given others in the set.
 
     An array with one value for each variant, or of shape () if all variants have the
-    same. A cause that begins at an instant is likelier if it begins on both triads at
-    the same instant, above all when the device may have been switched off. If one usual
-    cause is in the set, the device was probably never calibrated, and the other usual
-    causes are likelier.
+    same. A cause that begins at an instant is likelier if another of the same event, as
+    on the other triad, is in the set and begins at the same instant, above all when the
+    device may have been switched off. If one usual cause is in the set, the device was
+    probably never calibrated, and the other usual causes are likelier.
     """
     share = np.array(np.log(cause.chance / len(cause.variants)))
     if cause.expected:
@@ -102,10 +102,10 @@ def variant_log_priors(cause: Cause, others: Iterable[Member]) -> Array:
     if cause.kind != "effect":
         return share
     others = list(others)
-    same = [m for m in others if m[0].name == cause.name]
+    same = [m for m in others if m[0].event == cause.event]
     at_once = {g for _, other in same for g in cause.simultaneous_variants(other)}
     if at_once:
-        off = any(g in other.expected for other, g in same)
+        off = any(g in other.expected for other, g in same if other.name == cause.name)
         both = cause.expected & at_once if off else frozenset[Group]()
         odds = 1 / priors.BOTH_RESTART_ODDS if both else priors.COMPANION_CHANCE
         share = _with_other_odds(cause, share, at_once - both, odds)

@@ -219,12 +219,12 @@ class Offers:
 
     def cause_log_priors(self, current: Set) -> tuple[Array, dict[int, Array]]:
         """Log prior of every cause given a set; for each variant where they differ."""
-        names = {c.name for c, _ in current.members}
+        events = {c.event for c, _ in current.members}
         usual = any(c.usual for c, _ in current.members)
         log_prior = self.sets.dictionary.cause_log_priors.copy()
         log_prior_by_variant: dict[int, Array] = {}
         for i, cause in enumerate(self.sets.dictionary.causes):
-            if cause.name in names or cause.expected or (usual and cause.usual):
+            if cause.event in events or cause.expected or (usual and cause.usual):
                 shares = variant_log_priors(cause, current.members)
                 log_prior[i] = shares.min()
                 if shares.ndim:

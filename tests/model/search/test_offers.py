@@ -107,6 +107,29 @@ def test_what_jumps_on_both_triads_jumps_at_once_or_is_two_events() -> None:
     )
 
 
+def test_what_comes_of_one_event_begins_with_it() -> None:
+    """Scale factors jump when biases do, as after a device has calibrated itself."""
+    both = Session.of(ladder(), ("bias_step:acc", "scale_step", "mount_slip"))
+    jump, scale, slip = (
+        next(c for c in both.dictionary.causes if c.key == key)
+        for key in ("bias_step:acc", "scale_step", "mount_slip")
+    )
+    group = [g for g in jump.variants if len(g.params) == 3][20]
+    shares = variant_log_priors(scale, [(jump, group)])
+    at = np.array([g.shape["at_s"] for g in scale.variants])
+    off = np.abs(at - group.shape["at_s"])
+    at_once = off == off.min()
+    assert np.exp(shares[at_once]).sum() == pytest.approx(priors.COMPANION_CHANCE)
+    alone = np.log(scale.chance / len(at))
+    np.testing.assert_allclose(shares[~at_once], alone)
+    assert variant_log_priors(scale, [(slip, slip.variants[0])]) == pytest.approx(alone)
+    number = both.dictionary.causes.index(scale)
+    search = both.search(both.noise(np.random.default_rng(2)))
+    start = search.sets.evaluate(((jump, group),))
+    _, by_variant = search.offers.cause_log_priors(start)
+    np.testing.assert_allclose(by_variant[number], shares)
+
+
 def test_where_the_device_may_have_been_off_both_triads_jump_by_some_size() -> None:
     at = sorted({g.shape["at_s"] for g in ACC.variants})[7]
     acc, gyr = (c.expecting_within([(at - 1e-3, at + 1e-3)]) for c in (ACC, GYR))

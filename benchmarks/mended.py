@@ -90,6 +90,16 @@ SESSIONS = (
         "7.8 sigma: a scale factor that steps with the biases",
     ),
     Session(
+        75300233,
+        ("calibrates itself",),
+        "6.7 sigma: a scale factor that steps, for which a K2 was taken",
+    ),
+    Session(
+        75305601,
+        ("supply falls",),
+        "20.7 sigma: scale factors that fall with the supply",
+    ),
+    Session(
         75101459,
         ("calibrates itself", "resampled"),
         "27 sigma: a jump in one window, for which all were taken to be in a hand",

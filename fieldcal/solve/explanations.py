@@ -31,7 +31,8 @@ from fieldcal.model.causes.random_causes import random_causes
 from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.physics.effect import Motion, Scatter, Sensor
+from fieldcal.physics.effect import Effect, Motion, Scatter, Sensor
+from fieldcal.physics.experience import Experience
 
 MAX_SUBSET_PARAMETERS = 3
 """Largest number of parameters of which subsets are taken as variants."""
@@ -233,23 +234,36 @@ def _of_same_events(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
     known = {c.key for c in causes}
     for event in dict.fromkeys(c.event for c in causes if c.kind == "effect"):
         first = next(c for c in causes if c.event == event)
-        group = first.variants[0]
-        own = group.effect
-        if not isinstance(own, Sensor):
+        shown = first.variants[0].effect
+        if isinstance(shown, Sensor):
+            for effect in _effects_of_event(shown, d.x):
+                for other in _begun_with(d, first, effect):
+                    if other.key not in known:
+                        yield other, other.variants[0]
+
+
+def _effects_of_event(shown: Sensor, x: Experience) -> list[Effect]:
+    """An effect, and others of the catalogue that come of its event."""
+    if not shown.event:
+        return [shown]
+    every = (e for e in catalogue().values() if e.event == shown.event)
+    return [e for e in every if e.acts_on(x)]
+
+
+def _begun_with(d: Dictionary, first: Cause, effect: Effect) -> Iterator[Cause]:
+    """Causes of an effect, one for each triad, that begin as another cause does."""
+    group = first.variants[0]
+    for part, params in parameter_groups(d, effect):
+        if not params:
             continue
-        others = [e for e in catalogue().values() if own.event and e.event == own.event]
-        for effect in others or [own]:
-            for part, params in parameter_groups(d, effect):
-                chance = effect.chance(d.x)
-                other = replace(first, name=effect.id, part=part, chance=chance)
-                if params and other.key not in known and effect.acts_on(d.x):
-                    named = replace(
-                        group, cause=effect.id, part=part, params=params, effect=effect
-                    )
-                    every = _group_variants(d, named)
-                    if effect is not own:
-                        every = list(_of_likely_sizes(every))
-                    yield replace(other, variants=tuple(every)), every[0]
+        named = replace(group, cause=effect.id, part=part, params=params, effect=effect)
+        variants = _group_variants(d, named)
+        if effect is not group.effect:
+            variants = list(_of_likely_sizes(variants))
+        yield replace(
+            first, name=effect.id, part=part, chance=effect.chance(d.x),
+            variants=tuple(variants),
+        )  # fmt: skip
 
 
 def _of_likely_sizes(variants: Sequence[Group]) -> Iterator[Group]:

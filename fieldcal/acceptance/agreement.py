@@ -20,7 +20,7 @@ from fieldcal.acceptance.harmless import harmless_scatter_note
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.probability import chi2_tail
-from fieldcal.core.sentences import join_words
+from fieldcal.core.sentences import degrees_of_freedom, join_words
 
 FIT = "fit"
 """Name of the check whether the positions agree with each other."""
@@ -86,7 +86,7 @@ def _agreement_check(
     word = "agree" if agree else "do not agree"
     says = (
         f"the {what} {word} with each other: χ² = {chi2:.1f} with"
-        f" {dof} degrees of freedom, probability {chance:.2g}, required"
+        f" {degrees_of_freedom(dof)}, probability {chance:.2g}, required"
         f" {limits.fit_chance:.2g}"
     )
     if not agree and (small := harmless_scatter_note(calibration, limits, sensor)):

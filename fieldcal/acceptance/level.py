@@ -15,6 +15,7 @@ import numpy as np
 from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
 from fieldcal.core.probability import chi2_tail
+from fieldcal.core.sentences import degrees_of_freedom
 from fieldcal.session.description import Description
 
 BLIND = 2
@@ -72,7 +73,7 @@ def check_level(calibration: Calibration, about: Description) -> list[Check]:
         says = (
             f"the base is level to ± {level:.2g}°, as stated, but the positions show a"
             f" tilt of {shown['tilt_deg']:.2g}° (χ² = {shown['chi2']:.0f} with"
-            f" {shown['dof']} degrees of freedom): level the base and record again, or"
+            f" {degrees_of_freedom(shown['dof'])}): level the base and record again, or"
             " leave the statement out (--level, level_deg), and the tilt is estimated"
         )
         return [Check("level", False, says)]

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fieldcal.core.sentences import degrees_of_freedom
+
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration, Comparison
 
@@ -166,7 +168,7 @@ def _together(found: Comparison) -> str:
     if not found.dof:
         return "the same; neither calibration has an uncertainty"
     return (
-        f"χ² = {found.chi2:.1f} with {found.dof} degrees of freedom, "
+        f"χ² = {found.chi2:.1f} with {degrees_of_freedom(found.dof)}, "
         f"probability {found.chance:.2g} if nothing has changed"
     )
 

@@ -15,6 +15,7 @@ from fieldcal.calibration.wording import (
     parameter_title,
 )
 from fieldcal.commands.install_values import install_lines
+from fieldcal.core.sentences import degrees_of_freedom
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -121,6 +122,6 @@ def _fit_sentence(calibration: Calibration) -> str:
     else:  # a closed form leaves none
         return method
     return (
-        f"{method}; χ² = {calibration.chi2:.1f} with {calibration.dof} degrees of"
-        f" freedom; rms residual {rms}"
+        f"{method}; χ² = {calibration.chi2:.1f} with"
+        f" {degrees_of_freedom(calibration.dof)}; rms residual {rms}"
     )

@@ -1,4 +1,4 @@
-"""Lists of words in a sentence."""
+"""Lists of words, and numbers of things, in a sentence."""
 
 from __future__ import annotations
 
@@ -12,3 +12,12 @@ def join_words(words: Sequence[str], last: str = "and") -> str:
     ('a', 'a and b', 'a, b or c')
     """
     return f" {last} ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
+
+
+def degrees_of_freedom(dof: int) -> str:
+    """How many degrees of freedom there are.
+
+    >>> degrees_of_freedom(1), degrees_of_freedom(12)
+    ('1 degree of freedom', '12 degrees of freedom')
+    """
+    return f"{dof} degree{'' if dof == 1 else 's'} of freedom"

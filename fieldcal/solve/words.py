@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.core.gravity import G0
 from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array
-from fieldcal.core.sentences import join_words
+from fieldcal.core.sentences import degrees_of_freedom, join_words
 from fieldcal.model import thresholds
 from fieldcal.model.turns.motion import MAX_TURN_S
 
@@ -62,7 +62,7 @@ def scatter_warning(what: str, chi2: float, dof: int, spread: float, unit: str) 
         )
     return (
         f"the {what} scatter more than the noise of their windows "
-        f"(χ² = {chi2:.0f} with {dof} degrees of freedom): the uncertainties include "
+        f"(χ² = {chi2:.0f} with {degrees_of_freedom(dof)}): the uncertainties include "
         f"an additional scatter of {spread:.2g} {unit}{few}; {cause}"
     )
 

@@ -147,3 +147,16 @@ def test_units_that_stand_in_a_label_are_those_of_its_values(
     (block,) = read(tmp_path, lines, timed=False).values()
     np.testing.assert_allclose(block.acc, FORCE, atol=1e-4)
     np.testing.assert_allclose(block.gyr, RATES, atol=1e-6)
+
+
+def test_another_message_between_rows_gives_them_no_time(tmp_path: Path) -> None:
+    """Its own would be that of the row behind it, of which it is no part."""
+    lines = [f"14:20:00.000 -> Filter bandwidth set to: {21} Hz"]
+    for i in range(ROWS):
+        at = f"14:20:{5 + i / RATE:06.3f} -> "
+        lines += [f"{at}Accel {axes(FORCE[i])} m/s^2", f"{at}Gyro {axes(RATES[i])}"]
+        if i == ROWS // 2:
+            lines.append(f"14:20:{5 + (i + 0.9) / RATE:06.3f} -> Battery left: 97")
+    (block,) = read(tmp_path, lines, True).values()
+    np.testing.assert_allclose(block.t, np.arange(ROWS) / RATE, atol=1e-6)
+    np.testing.assert_array_equal(block.acc, FORCE)

@@ -4,6 +4,10 @@
     PARM, 1000, INS_ACCOFFS_X, 0.1
     IMU, 2018601318, 0, 0.01, 0.02, 0.03, 0.1, 0.2, -9.8, 0, 0, 38.5, …
 
+or as mavlogdump shows it, where each message names its fields:
+
+    2023-04-05 10:11:12.00: IMU {TimeUS : 2018601318, I : 0, GyrX : 0.01, …}
+
 Messages are m/s^2 and rad/s. Where ``IMU`` is not logged, but ``ACC`` and ``GYR`` are,
 each of the accelerometer goes with the nearest of the gyroscope. Which are, their
 definitions do not say: those of all messages stand at the beginning.
@@ -16,7 +20,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from fieldcal.importing.text.nearest_lines import NearestLines
-from fieldcal.importing.text.text_form import Reader, TextForm
+from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
 from fieldcal.importing.text.text_top import is_number, split_cells
 
 BEGINS = 20
@@ -27,10 +31,24 @@ RATES = ("GyrX", "GyrY", "GyrZ")
 FORCES = ("AccX", "AccY", "AccZ")
 WARM = ("T", "Temp")
 
-_DEFINED = re.compile(r"FMT,\s*\d+,\s*\d+,\s*(IMU|ACC|GYR),\s*\w+,\s*(.*)")
+_DEFINED = re.compile(
+    r"FMT(?:,\s*\d+,\s*\d+,| \{.*\bName :)\s*(IMU|ACC|GYR),"
+    r"(?:\s*\w+,| Format : \w+, Columns :)\s*([\w, ]+)"
+)
+
+_SHOWN = re.compile(r"(?:\S+ \S+: )?([A-Z][A-Z\d]*) \{(.*)\}\s*")
+"""A message with its fields, and before it the time at which it came."""
+
+_FIELD = re.compile(r"(\w+) : ([^,{}]*)")
+
+MESSAGES = ("IMU", "ACC", "GYR")
 
 Defined = Mapping[str, Sequence[str]]
 """Fields of each message, of which the first is its name."""
+
+
+Message = tuple[str, dict[str, str]]
+"""Name of a message, and the values of its fields."""
 
 
 class DataflashText(TextForm):
@@ -52,11 +70,15 @@ class DataflashText(TextForm):
 
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> DataflashText | None:
-        """The form, if it begins with what defines messages."""
-        if not any(line.startswith("FMT,") for line in lines[:BEGINS]):
+        """The form, if it begins with what defines messages, or messages do."""
+        shown = is_true_of_most(lines, lambda line: _SHOWN.fullmatch(line) is not None)
+        if not (shown or any(line.startswith("FMT,") for line in lines[:BEGINS])):
             return None
-        said = [found for line in lines if (found := _DEFINED.match(line))]
+        said = [found for line in lines if (found := _DEFINED.search(line))]
         defined = {one[1]: [one[1], *split_cells(one[2], ",")] for one in said}
+        for name, fields in filter(None, map(_shown_message, lines)):
+            # mavlogdump may show no definitions
+            defined.setdefault(name, [name, *fields])
         whole = {*defined} >= {"IMU"} or {*defined} >= {"ACC", "GYR"}
         timed = all({*TIMES} & {*fields} for fields in defined.values())
         return cls(defined) if whole and timed else None
@@ -67,18 +89,16 @@ class DataflashText(TextForm):
         wanted: list[str] = []
         pairs = NearestLines(len(RATES))
 
-        def messages(lines: Sequence[str]) -> list[tuple[str, dict[str, str]]]:
+        def messages(lines: Sequence[str]) -> list[Message]:
             """Messages of the first instance, by their names and fields."""
             found = []
             for line in lines:
-                fields = self._defined.get(line.partition(",")[0].strip(), ())
-                row = split_cells(line, ",")
-                if not fields or len(row) != len(fields):
+                message = _shown_message(line) or self._defined_message(line)
+                if message is None or not self._is_whole(message):
                     continue
-                said = dict(zip(fields, row, strict=True))
-                mine = said.get("I", "")
-                if first.setdefault(row[0], mine) == mine:
-                    found.append((row[0], said))
+                mine = message[1].get("I", "")
+                if first.setdefault(message[0], mine) == mine:
+                    found.append(message)
             return found
 
         def read(lines: Sequence[str]) -> list[str]:
@@ -103,10 +123,37 @@ class DataflashText(TextForm):
 
         return read
 
+    def _is_whole(self, message: Message) -> bool:
+        """Whether a message has the fields of its kind."""
+        name, fields = message
+        return [name, *fields] == [*self._defined.get(name, ())]
+
+    def _defined_message(self, line: str) -> Message | None:
+        """The name and fields of a message that is a row of values; None of others."""
+        fields = self._defined.get(line.partition(",")[0].strip(), ())
+        row = split_cells(line, ",") if fields else []
+        if not fields or len(row) != len(fields):
+            return None
+        return row[0], dict(zip(fields[1:], row[1:], strict=True))
+
     def _row(self, one: Mapping[str, str]) -> list[str]:
         """Cells of a message that has all channels."""
         warm = next((one[name] for name in WARM if name in one), "")
         return [*(one.get(n, "") for n in (self._time, *RATES, *FORCES)), warm]
+
+
+def _shown_message(line: str) -> Message | None:
+    """The name and fields of an IMU's message that names them; None of other lines.
+
+    >>> _shown_message("2023-04-05 10:11:12.00: ACC {TimeUS : 5, AccX : 0.1}")
+    ('ACC', {'TimeUS': '5', 'AccX': '0.1'})
+    >>> _shown_message("ATT {TimeUS : 5}"), _shown_message("IMU, 5, 0.1")
+    (None, None)
+    """
+    said = _SHOWN.fullmatch(line)
+    if said is None or said[1] not in MESSAGES:
+        return None
+    return said[1], {name: text.strip() for name, text in _FIELD.findall(said[2])}
 
 
 def _in_order(row: Sequence[str]) -> list[str]:

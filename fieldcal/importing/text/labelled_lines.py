@@ -149,9 +149,15 @@ class LabelledValues(TextForm):
 
         return read
 
-    def _values(self, said: Iterable[Labelled]) -> dict[str, str]:
-        """Values of a line that are in columns; none of another device."""
+    def _values(self, said: Sequence[Labelled]) -> dict[str, str]:
+        """Values of a line that are in columns; none of another device or message.
+
+        Whatever has nothing but its time and its name in columns is another message.
+        """
         values = {k: v for k, v in said if k in self.names}
+        others = {k for k, _ in said} - self._stays - CLOCKS
+        if others and not others & values.keys():
+            return {}
         return values if values.get(DEVICE, "") in ("", *self._devices) else {}
 
     def _is_another(self, row: dict[str, str], values: dict[str, str]) -> bool:

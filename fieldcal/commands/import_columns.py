@@ -47,7 +47,7 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
         help="numbers of the file at no acceleration, such as 32768,32768,32768;"
         " one for all three axes if they are alike",
     )
-    add("--temp-unit", default="", help="degC, cdegC, K, degF, count, none")
+    add("--temp-unit", default="", help="degC, cdegC, mdegC, K, degF, count, none")
     add("--temp-lsb", type=float, default=1.0, metavar="N", help="counts in 1 K")
     add("--temp-zero", type=float, default=0.0, metavar="C", help="deg C at count 0")
 

@@ -15,6 +15,7 @@ from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 TEMP_UNITS = {
     "degC": (1.0, 0.0),
     "cdegC": (0.01, 0.0),
+    "mdegC": (0.001, 0.0),
     "K": (1.0, -273.15),
     "degF": (5 / 9, -160 / 9),
     "none": (np.nan, np.nan),

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
@@ -17,6 +18,7 @@ from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.text.labels import labelled_values
 from fieldcal.importing.text.text_forms import forms_of
 from fieldcal.importing.times.clock_text import ClockText, is_clock
+from fieldcal.session.folder import Session
 
 BEGAN = datetime(2024, 5, 3, 23, 59, 58)
 RATE, ROWS = 20.0, 80
@@ -337,3 +339,20 @@ def test_lines_of_two_sensors_may_come_many_at_a_time(
     got = concat(list(recording.blocks("0")))
     np.testing.assert_array_equal(got.acc[:, 0], np.arange(ROWS) + 0.5)
     np.testing.assert_array_equal(got.gyr[:, 0], got.acc[:, 0])
+
+
+def test_a_clock_that_is_the_same_in_all_rows_is_not_their_time(
+    tmp_path: Path,
+) -> None:
+    """A database writes from when to when it was asked before the time of a row."""
+    asked = "2024-05-03T14:00:00Z,2024-05-03T15:00:00Z"
+    lines = ["_start,_stop,_time,host,ax,ay,az"]
+    lines += [
+        f"{asked},2024-05-03T14:20:{31 + i / 50:06.3f}Z,pi,0.1,{i % 3},9.8"
+        for i in range(400)
+    ]
+    path = tmp_path / "query.csv"
+    path.write_text("\n".join(lines) + "\n")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+    block = Session.open(tmp_path / "out").block
+    np.testing.assert_allclose(block.t, np.arange(400) / 50, atol=1e-6)

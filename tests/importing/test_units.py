@@ -356,3 +356,34 @@ def test_steps_of_a_power_of_two_are_those_of_g(tmp_path: Path) -> None:
         else:
             with pytest.raises(InputError, match="gravity in no usual unit"):
                 read_files([path])
+
+
+@pytest.mark.parametrize("lsb", [14.375, 1 / 0.07])
+def test_counts_that_two_gyroscopes_have_are_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], lsb: float
+) -> None:
+    """Beside an ADXL345 stands an ITG-3200, or one by ST 0.6 % off it."""
+    table = turned(7, 100.0)
+    table[:, 1:4] = np.round(table[:, 1:4] / G * 256)
+    table[:, 4:] = np.round(np.rad2deg(table[:, 4:]) * lsb)
+    path = write(tmp_path, table, heading=COLUMNS)
+    assert main(["import", str(path)]) == 2
+    asked = capsys.readouterr().err
+    assert "--gyr-lsb 14.375" in asked
+    assert "--gyr-lsb 14.2857" in asked
+
+
+@pytest.mark.parametrize(
+    ("unit", "of_one"), [("milli deg", 1000), ("mdegC", 1000), ("c°C", 100)]
+)
+def test_parts_of_a_degree_are_what_a_heading_says(
+    tmp_path: Path, unit: str, of_one: float
+) -> None:
+    table = turned(8, 50.0)
+    warm = np.linspace(21.5, 26.5, len(table))
+    rows = np.column_stack([table, np.round(warm * of_one)])
+    path = write(tmp_path, rows, heading=f"{COLUMNS},Temperature [{unit}]")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+    np.testing.assert_allclose(
+        Session.open(tmp_path / "out").block.temperature, warm, atol=0.51 / of_one
+    )

@@ -193,9 +193,11 @@ class ClockColumn(TextForm):
             form.days = possible_days(next(words, ""))
             return form
         rows = [split_cells(line, parted) for line in lines]
-        clock = next((i for i, cell in enumerate(rows[-1]) if is_clock(cell)), None)
-        if clock is None:
+        clocks = [i for i, cell in enumerate(rows[-1]) if is_clock(cell)]
+        if not clocks:
             return None
+        # what a database was asked for, from when to when, is the same in all rows
+        clock = next((i for i in clocks if _changes(rows, i)), clocks[0])
         many = sum(len(row) > clock and is_clock(row[clock]) for row in rows)
         if many <= MOSTLY * len(rows):
             return None
@@ -228,6 +230,11 @@ class ClockColumn(TextForm):
             return line
         row[self.clock] = f"{since:.9f}"
         return (self._separator or " ").join(row)
+
+
+def _changes(rows: Sequence[Sequence[str]], i: int) -> bool:
+    """Whether a column of clocks is not the same in all rows."""
+    return len({row[i] for row in rows if len(row) > i and is_clock(row[i])}) > 1
 
 
 def _of_two_words(lines: Sequence[str]) -> int | None:

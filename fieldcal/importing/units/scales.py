@@ -119,12 +119,21 @@ BESIDE_CENTI = Scale(16 * 180 / np.pi, "deg/s", 16.0)
 sheet, register UNIT_SEL): 2 % less than those of a full scale of 2000 deg/s."""
 
 
-def rate_scales(acc_unit: str) -> tuple[Scale, ...]:
-    """Units and counts that rates may be in beside forces in a unit.
+BESIDE_ADXL345 = (256.0, Scale(14.375 * 180 / np.pi, "deg/s", 14.375))
+"""Counts in a g of the ADXL345 by Analog Devices, and in a deg/s of the ITG-3200 by
+InvenSense, which boards have beside it: 0.6 % off ST's 70 mdeg/s, which others have."""
+
+
+def rate_scales(acc_unit: str, acc_lsb: float = 1.0) -> tuple[Scale, ...]:
+    """Units and counts that rates may be in beside forces in a unit, or counts of it.
 
     >>> [s.lsb for s in rate_scales(CENTI) if 16 <= s.lsb < 17]
     [16.0]
+    >>> [round(s.lsb, 3) for s in rate_scales("g", 256) if 14 <= s.lsb < 15]
+    [14.286, 14.375]
     """
+    if acc_lsb == BESIDE_ADXL345[0]:
+        return (*GYR_SCALES, BESIDE_ADXL345[1])
     if acc_unit != CENTI:
         return GYR_SCALES
     near = np.log(GYR_OUT[0] + 1)

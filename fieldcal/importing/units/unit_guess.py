@@ -222,7 +222,7 @@ class UnitGuess:
                 self.doubts += self._columns.doubts(*rows, gravity)
             self._calm(block, gyr, gravity)
             return
-        known = rate_scales(self.said.acc_unit)
+        known = rate_scales(self.said.acc_unit, self.said.acc_lsb)
         fits = fitting_scales(reads, known, GYR_OUT[not gravity.round])
         fits = scales_of_decimals(fits, block.gyr)
         if self._halved:

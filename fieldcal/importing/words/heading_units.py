@@ -35,6 +35,11 @@ SPELLINGS = {
     "deg C": ("c", "°c", "°", "'c", "degc", "deg c", "celsius", "℃", "degrees c",
               "deg.c", "ºc", "cel", "degrees celsius", "deg celsius", "degree c",
               "degree celsius"),
+    "cdeg C": ("cdegc", "c°c", "centi deg", "centi deg c", "centidegc", "centi degc",
+               "centidegrees c", "centidegrees celsius"),
+    "mdeg C": ("mdegc", "m°c", "milli deg", "milli deg c", "millidegc", "milli degc",
+               "milli °c", "millidegrees c", "millidegrees celsius",
+               "milli degrees celsius"),
     "K": ("kelvin", "degk", "deg k"),
     "deg F": ("°f", "degf", "deg f", "fahrenheit", "℉", "degrees f", "ºf",
               "degrees fahrenheit", "deg fahrenheit"),
@@ -44,10 +49,12 @@ SPELLINGS = {
 CAPITALS = {"K": "K", "F": "deg F"}
 """Units only as capital letters: small ones count steps, or say what is filtered."""
 
-TEMPERATURES = {"deg C": "degC", "K": "K", "deg F": "degF"}
+TEMPERATURES = {"deg C": "degC", "cdeg C": "cdegC", "mdeg C": "mdegC", "K": "K",
+                "deg F": "degF"}  # fmt: skip
 """Units of temperatures, and what ``--temp-unit`` calls them."""
 
-THERMOMETERS = (*SPELLINGS["K"], *SPELLINGS["deg F"], "°c", "degc", "deg c", "celsius",
+THERMOMETERS = (*SPELLINGS["K"], *SPELLINGS["deg F"], *SPELLINGS["cdeg C"],
+                *SPELLINGS["mdeg C"], "°c", "degc", "deg c", "celsius",
                 "℃", "degrees c", "deg.c", "ºc", "cel", "degrees celsius",
                 "deg celsius", "degree c", "degree celsius")  # fmt: skip
 """Units that tell a thermometer, whatever it is called: a lone c or ° may be any."""

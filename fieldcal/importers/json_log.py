@@ -3,7 +3,8 @@
     {"t": 0.01, "acc": [0.1, 0.2, 9.8], "gyro": {"x": 0, "y": 0, "z": 0}}
     [{"time": "2024-05-03T12:00:00.01Z", "ax": 0.1, ...}, ...]
     {"t": [0.01, ...], "ax": [0.1, ...], ...}
-    {'t': 0.01, 'ax': 0.1}             [0.01, 0.1, 0.2, 9.8]       as Python prints them
+    {'t': 0.01, 'ax': 0.1}             [0.01, 0.1, 0.2, 9.8]       as Python prints them,
+        also over several lines, with numbers of NumPy, or two objects in a line
     {"data": [{"imu6": {"Timestamp": 10, "ArrayAcc": [{"x": ...}, ...]}}, ...]}
 
 What lies within is named with what it lies in, ``acc/x``. Records that hold the samples
@@ -12,7 +13,6 @@ of some time say when it began; the samples lie evenly until the next begins.
 
 from __future__ import annotations
 
-import ast
 import json
 import re
 from collections.abc import Iterator
@@ -29,6 +29,10 @@ from fieldcal.importing.records.cut_json import (
     without_last_commas,
 )
 from fieldcal.importing.records.json_lists import json_lists
+from fieldcal.importing.records.python_text import (
+    python_value,
+    values_side_by_side,
+)
 from fieldcal.importing.records.record_stream import records_in_turn
 from fieldcal.importing.text.text_form import MOSTLY
 from fieldcal.importing.times.clock_text import is_clock
@@ -110,6 +114,11 @@ class JsonLog(ArrayFile):
                 return json.loads(one(text))
             except (ValueError, RecursionError):
                 pass
+        if text.strip()[-1:] in ("]", "}") and text.strip().count("\n"):
+            try:
+                return python_value(text)
+            except ValueError:
+                pass
         if (stream := records_in_turn(text)) is not None:
             if stream.is_cut:
                 self.damaged("its end", CUT_OFF)
@@ -174,7 +183,9 @@ def _parse_text(text: str) -> Any:
     try:
         return json.loads(text)
     except ValueError as error:
-        try:
-            return ast.literal_eval(text)
-        except (ValueError, SyntaxError, MemoryError):
-            raise error from None
+        for read in (python_value, values_side_by_side):
+            try:
+                return read(text)
+            except ValueError:
+                pass
+        raise error from None

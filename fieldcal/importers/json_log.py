@@ -3,7 +3,7 @@
     {"t": 0.01, "acc": [0.1, 0.2, 9.8], "gyro": {"x": 0, "y": 0, "z": 0}}
     [{"time": "2024-05-03T12:00:00.01Z", "ax": 0.1, ...}, ...]
     {"t": [0.01, ...], "ax": [0.1, ...], ...}
-    {'t': 0.01, 'ax': 0.1}             [0.01, 0.1, 0.2, 9.8]       as Python prints them,
+    {'t': 0.01, 'ax': 0.1}             [0.01, 0.1, 0.2, 9.8]      as Python prints them,
         also over several lines, with numbers of NumPy, or two objects in a line
     {"data": [{"imu6": {"Timestamp": 10, "ArrayAcc": [{"x": ...}, ...]}}, ...]}
 

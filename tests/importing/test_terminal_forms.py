@@ -152,3 +152,20 @@ def test_numbers_of_spreadsheets_are_read_in_either_way(x: float, digits: int) -
     german = written.translate(str.maketrans(",.", ".,"))
     for one in (german, written if "," in written else german):
         assert float(with_points(one)) == float(f"{x:.{digits}f}")
+
+
+@given(st.sampled_from("\t;"), st.lists(st.integers(1, 3), min_size=2, max_size=4))
+def test_spaces_within_cells_part_columns_too(sign: str, widths: list[int]) -> None:
+    many = sum(widths)
+    table = np.arange(many * ROWS).reshape(ROWS, many) / 4
+
+    def row(words: list[str]) -> str:
+        rest = iter(words)
+        return sign.join(" ".join(next(rest) for _ in range(n)) for n in widths)
+
+    names = row([f"c{i}" for i in range(many)])
+    rows = [row([f"{x:.2f}" for x in line]) for line in table]
+    done = undone([names, *rows])
+    if max(widths) > 1:
+        assert done[0] == sign.join(f"c{i}" for i in range(many))
+    np.testing.assert_array_equal(parse_numbers(done, None), table)

@@ -167,3 +167,57 @@ def _digits_in(column: Sequence[str], filled: bool = False) -> int:
     )
     alike = len(many) == 1 or extended
     return max(many) if alike and told and len(said) > len(column) / 2 + 1 else 0
+
+
+class SpacedCells(TextForm):
+    """Cells of which some hold several numbers, between spaces: a column for each.
+
+    So are lines above them that have as many words, ``t<tab>ax ay az<tab>gx gy gz``.
+    """
+
+    def __init__(self, separator: str, width: int) -> None:
+        self._separator, self._width = separator, width
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
+        """The form, if most lines have it."""
+        parted = find_separator(lines[-1]) if lines and not separator else separator
+        if parted not in ("\t", ";"):
+            return None
+        if not is_true_of_most(lines, lambda line: _holds_several(line, parted)):
+            return None
+        widths = [
+            len(_words(line, parted)) for line in lines if _holds_several(line, parted)
+        ]
+        return cls(parted, max(widths, key=widths.count))
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+        def one(line: str) -> str:
+            words = _words(line, self._separator)
+            if len(words) == self._width or _holds_several(line, self._separator):
+                return self._separator.join(words)
+            return line
+
+        return lambda lines: [one(line) for line in lines]
+
+
+def _holds_several(line: str, separator: str) -> bool:
+    """Whether all cells are numbers, and some several.
+
+    >>> [_holds_several(x, ";") for x in ("1;0.1 0,2;3", "1;2;3", "1;a 2;3", "1; 2;3")]
+    [True, False, False, False]
+    """
+    cells = [cell.split() for cell in line.split(separator)]
+    several = any(len(cell) > 1 for cell in cells)
+    return several and all(is_number(word, True) for cell in cells for word in cell)
+
+
+def _words(line: str, separator: str) -> list[str]:
+    """All words of a line; of an empty cell one without letters.
+
+    >>> _words("1;0.1 0.2;;3", ";")
+    ['1', '0.1', '0.2', '', '3']
+    """
+    return [word for cell in line.split(separator) for word in cell.split() or [""]]

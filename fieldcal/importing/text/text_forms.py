@@ -14,6 +14,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     0.01,0.1,0.2,9.8;                  lines with a mark at their end
     angular_velocity:\n  x: 0.1        messages as ROS shows them
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
+    0.01\t0.1 0.2 9.8\t0 0 0            spaces between numbers within a cell
     12,345,0.1,0.2                     decimal commas between commas, by the names
     FF3A 0012                          counts in hexadecimal digits
     gscale,0.0005                      counts below lines that say what one of them is
@@ -34,7 +35,12 @@ import re
 from collections.abc import Sequence
 
 from fieldcal.importing.text.bare_fractions import BareFractions
-from fieldcal.importing.text.cell_forms import BarTable, HexCells, ListCells
+from fieldcal.importing.text.cell_forms import (
+    BarTable,
+    HexCells,
+    ListCells,
+    SpacedCells,
+)
 from fieldcal.importing.text.dataflash_text import DataflashText
 from fieldcal.importing.text.grouped_digits import GroupedDigits
 from fieldcal.importing.text.labelled_lines import LabelledValues
@@ -253,7 +259,7 @@ FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
     ZephyrLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
-    QuotedCells, PairedCells, FortranNumbers, UnitCells,
+    QuotedCells, SpacedCells, PairedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, WordPrefix, BarTable, ListCells,
     SplitDecimals, SensorCodes, TaggedLines, ArrivalPrefix, HexCells, BareFractions,
     ClockColumn,

@@ -136,7 +136,7 @@ def test_each_of_two_imus_has_rates_that_are_called_p_q_r(tmp_path: Path) -> Non
 
 def test_what_no_name_says_beside_two_imus_is_said(tmp_path: Path) -> None:
     head = "time," + ",".join(f"{k}_a{x}" for k in "AB" for x in "xyz")
-    path = write(tmp_path, np.hstack([T, A, A, W]), heading=f"{head},u_x,u_y,u_z")
+    path = write(tmp_path, np.hstack([T, A, A + 0.1, W]), heading=f"{head},u_x,u_y,u_z")
     recording = open_recording(path, ReadOptions())
     assert len(recording.streams()) == 2
     assert "u_x u_y u_z: nothing says what they are; they are left out" in " ".join(

@@ -33,8 +33,15 @@ from fieldcal.importing.tables.column_choices import ask_of_choices, columns_opt
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate
 from fieldcal.importing.tables.column_source import column_numbers, holds_means
 from fieldcal.importing.tables.column_times import is_row_counter
+from fieldcal.importing.tables.copied_imus import copied_imus, tell_copied
 from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
+from fieldcal.importing.tables.known_channels import (
+    is_complete,
+    known_columns,
+    match_quality,
+    named_channels,
+)
 from fieldcal.importing.tables.means import row_scatter, scatter_columns
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
 from fieldcal.importing.words.heading_words import heading_meaning
@@ -156,15 +163,15 @@ class ColumnRecording(Recording):
             (headings.match_headings(*said), way)
             for said, way in zip(checked, headed, strict=True)
         ]
-        named = max((found for found, _ in ways), key=_match_quality, default=())
+        named = max((found for found, _ in ways), key=match_quality, default=())
         way = next((w for found, w in ways if found and found is named), None)
-        thermometer = bool(named) and not _channels(named[0]) & {"ax", "gx"}
-        if len(named) < 2 and not (thermometer or _is_complete(named)):
+        thermometer = bool(named) and not named_channels(named[0]) & {"ax", "gx"}
+        if len(named) < 2 and not (thermometer or is_complete(named)):
             beside = () if named else _beside(checked, table)
             told = self._told(named or beside, way or next((w for _, w in ways), None))
             if told is not None:
                 return {"0": told}
-        if not (thermometer or all(_is_complete([one]) for one in named)):
+        if not (thermometer or all(is_complete([one]) for one in named)):
             self._say_unnamed(named, way)
         for said in checked if not named else ():
             # the question of their size comes before that of their columns
@@ -174,6 +181,14 @@ class ColumnRecording(Recording):
             question = ask_of_choices(table, first)
             raise InputError(f"{self.path}: {question}" if question else self.ask())
         taken = {one.name: one.taken(self.wanted) for one in named}
+        places = {name: column_numbers(self, one) for name, one in taken.items()}
+        copies = copied_imus(table, places)
+        self.says += tell_copied(copies)
+        named = tuple(one for one in named if one.name not in copies)
+        if copies and len(named) == 1:
+            taken = {"0": taken[named[0].name]}
+            named = (replace(named[0], name="0"),)
+        taken = {one.name: taken[one.name] for one in named}
         rate = self.rate_said()
         for one in named:
             timed = rate is not None or holds_means(self, taken[one.name])
@@ -212,7 +227,7 @@ class ColumnRecording(Recording):
         k = table.shape[1]
         names = [c.name for c in way.columns] if way else []
         names = names if len(names) == k else [""] * k
-        known = _known(named, way)
+        known = known_columns(named, way)
         over = way.columns if way is not None and len(way.columns) == k else []
         told = column_physics.identify_columns(
             _without(table, headings.columns_without_axes(over)), names, known
@@ -256,7 +271,7 @@ class ColumnRecording(Recording):
             return
         known: dict[int, str] = {}
         for one in named:
-            known |= _known([one], way)
+            known |= known_columns([one], way)
         others = {
             i for i, c in enumerate(way.columns) if heading_meaning(c.name, c.unit)
         } | {*headings.columns_without_axes(way.columns)}
@@ -309,40 +324,9 @@ def _columns_of(table: Array, places: Mapping[str, int]) -> Array:
     return found
 
 
-def _match_quality(found: Sequence[HeadingMatch]) -> tuple[int, int]:
-    """Number of channels that are named, and of kinds whose unit is known."""
-    named = sum(len([c for c in one.columns if c != columns.SKIP]) for one in found)
-    return named, sum(bool(unit) for one in found for unit in one.units.values())
-
-
-def _is_complete(named: Sequence[HeadingMatch]) -> bool:
-    """Whether names identify specific force, rate and time."""
-    if not named:
-        return False
-    known = _channels(named[0])
-    return {"ax", "gx"} <= known and columns.has_time(known)
-
-
-def _channels(named: HeadingMatch) -> set[str]:
-    """Channels of an IMU that names identify."""
-    return {c.partition("=")[0] for c in named.columns}
-
-
 def _without(table: Array, numbers: Sequence[int]) -> Array:
     """A table (n, k) with nan in some columns."""
     out = table.copy()
     if len(out):
         out[:, list(numbers)] = np.nan
     return out
-
-
-def _known(named: Sequence[HeadingMatch], way: Heading | None) -> dict[int, str]:
-    """Channels that names identify, by number of column."""
-    if not named or way is None:
-        return {}
-    if way.skip:
-        pairs = enumerate(named[0].columns)
-        return {i: name for i, name in pairs if name != way.skip}
-    number = {c.place: i for i, c in enumerate(way.columns)}
-    parted = (c.partition("=") for c in named[0].columns)
-    return {number[place]: name for name, _, place in parted}

@@ -11,6 +11,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     %RAWIMUSA,2209,4916.2;...*1fb76c28  messages of a receiver
     $VNYMR,-131.1,+31.8,...*62         messages of a device by VectorNav
     channel idx=3 accel_xyz x = 0.1    channels of Zephyr's sensor shell
+    Reading from #4 (imu|SENSE_ACCEL)  devices of RIOT's
     0.01,0.1,0.2,9.8;                  lines with a mark at their end
     angular_velocity:\n  x: 0.1        messages as ROS shows them
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
@@ -56,6 +57,7 @@ from fieldcal.importing.text.nested_values import NestedValues
 from fieldcal.importing.text.paired_cells import PairedCells
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
+from fieldcal.importing.text.saul_lines import SaulLines
 from fieldcal.importing.text.scaled_counts import ScaledCounts
 from fieldcal.importing.text.sensor_codes import SensorCodes
 from fieldcal.importing.text.split_decimals import SplitDecimals
@@ -257,7 +259,7 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
-    ZephyrLines,
+    ZephyrLines, SaulLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
     QuotedCells, SpacedCells, PairedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, WordPrefix, BarTable, ListCells,

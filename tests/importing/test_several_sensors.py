@@ -13,7 +13,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importers import open_recording
 from fieldcal.importing.read_options import ReadOptions
-from fieldcal.importing.words.heading_words import is_counter
+from fieldcal.importing.words.other_columns import is_counter
 
 ROWS = turned(14, 50.0, 2.0)
 T, A, W = ROWS[:, :1], ROWS[:, 1:4], ROWS[:, 4:]

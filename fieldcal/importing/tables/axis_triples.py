@@ -15,10 +15,9 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.units.scales import MIN_ROWS
 from fieldcal.importing.words.heading_words import (
     heading_meaning,
-    is_counter,
-    is_other_quantity,
     words_in_name,
 )
+from fieldcal.importing.words.other_columns import is_counter, is_other_quantity
 from fieldcal.importing.words.sensor_words import AXES
 
 GROWS = 0.999

@@ -16,13 +16,15 @@ from fieldcal.importing.times.row_times import CLOCK_PARTS, FRACTIONS, NEAR_STEP
 from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.scales import MIN_ROWS, counts_beside, rounded_text
-from fieldcal.importing.units.time_units import (
+from fieldcal.importing.units.shared_times import (
     SHARED,
-    UNIX,
     SharedTimes,
-    possible_time_units,
     shared_times,
     time_units_of_bursts,
+)
+from fieldcal.importing.units.time_units import (
+    UNIX,
+    possible_time_units,
 )
 
 MIN_RATE_HZ, USUAL_RATE_HZ, MAX_RATE_HZ = 5.0, 100.0, 8000.0

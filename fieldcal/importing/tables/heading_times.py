@@ -15,7 +15,9 @@ from fieldcal.importing.tables.column_times import (
     keeps_growing,
     split_seconds,
 )
-from fieldcal.importing.units.time_units import shared_times
+from fieldcal.importing.units.shared_times import (
+    shared_times,
+)
 from fieldcal.importing.words.heading_words import heading_meaning
 
 CELSIUS = "deg C"

@@ -28,12 +28,14 @@ from fieldcal.importing.tables.column_times import (
 )
 from fieldcal.importing.times.repeats import NO_VALUES, distinct_rows
 from fieldcal.importing.times.row_times import CLOCK_PARTS, FRACTIONS
+from fieldcal.importing.units.shared_times import (
+    coarse_tick,
+    shared_times,
+)
 from fieldcal.importing.units.time_units import (
     RATE_TOLERANCE,
     TICKED,
-    coarse_tick,
     counts_from_long_ago,
-    shared_times,
     time_unit_near_rate,
     time_unit_of_rate,
     time_unit_of_ticks,

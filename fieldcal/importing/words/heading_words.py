@@ -57,18 +57,6 @@ _ANGLES = {"rad": "rad/s", "deg": "deg/s"}
 _NO_RATE = ("angle", "roll", "pitch", "yaw", "heading", "euler", "theta", "phi")
 """Words of angles that are no rates."""
 
-COUNTERS = ("packet", "packets", "counter", "count", "cntr", "cnt", "index", "idx",
-            "number", "nr", "no", "frame", "row", "line", "sample", "samples", "seq",
-            "sequence", "id", "n")  # fmt: skip
-"""Words of columns that count rows or messages."""
-
-TURNED = ("rate", "rates", "speed", "rpm", "angle", "commanded", "command", "cmd",
-          "setpoint", "target")  # fmt: skip
-"""Words of what a table does, whose steps may only grow."""
-
-COUNTED = ("data", "message", "messages", "msg", "record", "records")
-"""Words of what is counted, which stand beside them."""
-
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host", "t_h": "t_h",
           "t_min": "t_min"}  # fmt: skip
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated",
@@ -281,29 +269,6 @@ def words_in_name(name: str) -> list[str]:
     bracketed = _BRACKETS.fullmatch(name.strip())
     bare = bracketed.group(1) if bracketed else name
     return [w.lower() for w in _WORD.findall(bare)]
-
-
-def is_counter(name: str) -> bool:
-    """Whether a name is that of a counter, whose numbers are no times.
-
-    >>> [is_counter(one) for one in ("Packet number", "DATA_CNTR", "sample_time", "")]
-    [True, True, False, False]
-    """
-    words = words_in_name(name)
-    return bool({*words} & {*COUNTERS}) and {*words} <= {*COUNTERS, *COUNTED}
-
-
-def is_other_quantity(name: str) -> bool:
-    """Whether a name is that of a quantity that may only grow, and is no time.
-
-    >>> [is_other_quantity(one) for one in ("table rate (deg/s)", "rpm", "T [K]", "c1")]
-    [True, True, True, False]
-    """
-    said = heading_meaning(name)
-    if said is not None:
-        return said.kind == "temperature"
-    units = {unit for _, unit in name_unit_splits(name, "") if unit}
-    return bool(units - {*UNITS["t"]} or {*words_in_name(name)} & {*TURNED})
 
 
 def _find_phrase(words: Sequence[str], phrase: Sequence[str]) -> int | None:

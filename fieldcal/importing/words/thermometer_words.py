@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fieldcal.importing.words.heading_words import COUNTERS
+from fieldcal.importing.words.other_columns import COUNTERS
 
 FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air",
            "board", "env", "cpu", "case", "gps", "room", "motor", "esc", "battery",

@@ -14,7 +14,7 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing.units.scales import MIN_ROWS
 
-NEAR = 4.0
+NEAR = 5.0
 """Standard errors by which the median of what a filter took away is off zero."""
 
 MEDIAN_ERROR = 1.2533 * 1.4826
@@ -22,6 +22,9 @@ MEDIAN_ERROR = 1.2533 * 1.4826
 
 CALM = 6.0
 """Median absolute deviations within which the noise lies, as long as nothing turns."""
+
+SAME = 0.99
+"""Part of another's steps that those of a filtered output are less than."""
 
 FOLLOWS = 0.6
 """Share of the steps of two sensors that have the same sign: 0.5 by chance, and more
@@ -46,8 +49,9 @@ def copied_imus(table: Array, imus: Mapping[str, Mapping[str, int]]) -> dict[str
         one, other = (table[:, [imus[i][c] for c in shared]] for i in (first, second))
         if {first, second} & {*found} or not shared or not _is_copied(one, other):
             continue
-        quieter = np.mean(_steps(other) < _steps(one)) > 0.5 or (one == other).all()
-        found[second if quieter else first] = first if quieter else second
+        # what was written again has other digits at most
+        filtered = np.median(_steps(one) / _steps(other)) < SAME
+        found[first if filtered else second] = second if filtered else first
     return found
 
 
@@ -86,8 +90,9 @@ def _middle_and_spread(values: Array) -> tuple[Array, Array]:
 
 
 def _steps(outputs: Array) -> Array:
-    """Usual size (k,) of the steps of outputs (n, k) from row to row."""
-    size: Array = np.nanmedian(np.abs(np.diff(outputs, axis=0)), axis=0)
+    """Usual size (k,) of the steps of outputs (n, k) that change, from row to row."""
+    steps = np.abs(np.diff(outputs, axis=0))
+    size: Array = np.nanmedian(np.where(steps > 0, steps, np.nan), axis=0)
     return size
 
 

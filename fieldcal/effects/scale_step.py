@@ -3,8 +3,8 @@
     U_i += q_i f_i (t >= t_0)
 
 U and f m/s^2, device axes; t_0 = at_s, device time, s; q 1. Source: a device that
-changes its range or begins to apply another calibration; STMicroelectronics, LSM6DSO,
-DS12140, table 2: the sensitivities of two ranges are within 1 % each.
+changes its range or begins to apply another calibration; Analog Devices, ADXL350, table
+1: the sensitivity of each range has limits of its own, 7.5 % from its nominal value.
 
 >>> import numpy as np
 >>> still = np.zeros(2)
@@ -20,13 +20,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import NO_SHAPE, OwnForce, Param
+from fieldcal.physics.effect import NO_SHAPE, Param, ScaleChange
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
 from fieldcal.physics.step import step_course
 
 
-class ScaleStep(OwnForce):
+class ScaleStep(ScaleChange):
     """Jump of the accelerometers' scale factors."""
 
     params = tuple(Param(i, "1", 3e-3) for i in "xyz")
@@ -40,7 +40,7 @@ class ScaleStep(OwnForce):
         "Fix the range of the device and switch off what calibrates it by itself; "
         "take the positions before the step again."
     )
-    source = "a range that changes, a calibration of its own; 0.01 to 1 %"
+    source = "judged: another range or calibration, 0.01 to 1 %"
 
     def chance(self, x: Experience) -> float:
         """Of three hundred sessions one has it."""

@@ -16,11 +16,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import NO_SHAPE, OwnForce, Param
+from fieldcal.physics.effect import NO_SHAPE, Param, ScaleChange
 from fieldcal.physics.experience import Experience
 
 
-class TemperatureScale(OwnForce):
+class TemperatureScale(ScaleChange):
     """Temperature coefficient of the accelerometers' scale factors."""
 
     params = tuple(Param(i, "1/K", 3e-4) for i in "xyz")

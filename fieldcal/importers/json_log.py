@@ -114,15 +114,15 @@ class JsonLog(ArrayFile):
                 return json.loads(one(text))
             except (ValueError, RecursionError):
                 pass
+        if (stream := records_in_turn(text)) is not None:
+            if stream.is_cut:
+                self.damaged("its end", CUT_OFF)
+            return stream.records
         if text.strip()[-1:] in ("]", "}") and text.strip().count("\n"):
             try:
                 return python_value(text)
             except ValueError:
                 pass
-        if (stream := records_in_turn(text)) is not None:
-            if stream.is_cut:
-                self.damaged("its end", CUT_OFF)
-            return stream.records
         if (whole := whole_beginning(text)) is not None:
             try:
                 document = _parse_text(whole)

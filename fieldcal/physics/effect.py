@@ -235,14 +235,14 @@ class BiasChange(Separable):
         return np.broadcast_to(np.eye(6), (len(x), 6, 6))
 
 
-class OwnForce(Separable):
-    """A change of the accelerometers' scale factors by one course.
+class ScaleChange(Separable):
+    """An effect that adds one course to the accelerometers' scale factors.
 
-    Each has a parameter of its own, named x, y and z.
+    Parameters are named x, y and z, one for each.
     """
 
     def pattern(self, x: Experience) -> Array:
-        """Force along the axis of each output of the accelerometers."""
+        """Force along its own axis on each output of the accelerometers."""
         out = np.zeros((len(x), 6, 3))
         out[:, range(3), range(3)] = x.f
         return out

@@ -237,9 +237,7 @@ def _of_same_events(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
         shown = first.variants[0].effect
         if isinstance(shown, Sensor):
             for effect in _effects_of_event(shown, d.x):
-                for other in _begun_with(d, first, effect):
-                    if other.key not in known:
-                        yield other, other.variants[0]
+                yield from _begun_with(d, first, effect, known)
 
 
 def _effects_of_event(shown: Sensor, x: Experience) -> list[Effect]:
@@ -250,20 +248,20 @@ def _effects_of_event(shown: Sensor, x: Experience) -> list[Effect]:
     return [e for e in every if e.acts_on(x)]
 
 
-def _begun_with(d: Dictionary, first: Cause, effect: Effect) -> Iterator[Cause]:
-    """Causes of an effect, one for each triad, that begin as another cause does."""
+def _begun_with(
+    d: Dictionary, first: Cause, effect: Effect, known: set[str]
+) -> Iterator[Member]:
+    """An effect on each triad, beginning as another cause does; none of known keys."""
     group = first.variants[0]
     for part, params in parameter_groups(d, effect):
-        if not params:
+        other = replace(first, name=effect.id, part=part, chance=effect.chance(d.x))
+        if not params or other.key in known:
             continue
         named = replace(group, cause=effect.id, part=part, params=params, effect=effect)
         variants = _group_variants(d, named)
         if effect is not group.effect:
             variants = list(_of_likely_sizes(variants))
-        yield replace(
-            first, name=effect.id, part=part, chance=effect.chance(d.x),
-            variants=tuple(variants),
-        )  # fmt: skip
+        yield replace(other, variants=tuple(variants)), variants[0]
 
 
 def _of_likely_sizes(variants: Sequence[Group]) -> Iterator[Group]:

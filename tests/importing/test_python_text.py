@@ -22,6 +22,10 @@ ROWS = turned(11, 50.0)
 START = datetime(2024, 5, 3, 23, 59, 50)  # noqa: DTZ001
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+PLAIN = (int, float, complex, bool, type(None), str, bytes, list, tuple, dict, set,
+         type(...))  # fmt: skip
+"""Types of what Python reads back without running anything."""
+
 OBJECTS = st.recursive(
     st.none() | st.booleans() | NUMBERS | st.text(max_size=5),
     lambda inner: (
@@ -79,6 +83,7 @@ def test_any_object_is_read_back(value: Any) -> None:
 def test_any_text_is_an_object_or_none(text: str) -> None:
     for read in (python_value, values_side_by_side):
         try:
-            read(text)
+            found = read(text)
         except ValueError:
-            pass
+            continue
+        assert type(found) in PLAIN

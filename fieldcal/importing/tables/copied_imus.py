@@ -24,7 +24,7 @@ CALM = 6.0
 """Median absolute deviations within which the noise lies, as long as nothing turns."""
 
 SAME = 0.99
-"""Part of another's steps that those of a filtered output are less than."""
+"""Steps of a filtered output are smaller than this part of the other's."""
 
 FOLLOWS = 0.6
 """Share of the steps of two sensors that have the same sign: 0.5 by chance, and more

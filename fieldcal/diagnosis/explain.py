@@ -19,6 +19,7 @@ from fieldcal.core.sampling import sampling_rate
 from fieldcal.diagnosis.factory_left import enlarge_to_shown_grade
 from fieldcal.diagnosis.fit import build_fit, fit_calibration_only
 from fieldcal.diagnosis.prepare import PreparedRecording
+from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.sinking import NAME as SINKING
@@ -132,8 +133,14 @@ class Explanation:
 
     @cached_property
     def probable_causes(self) -> tuple[ProbableCause, ...]:
-        """Causes with a probability above one half."""
-        return tuple(self.posterior.probable_causes())
+        """Causes with a probability above one half.
+
+        Effects are not among them if the rows took so many causes that none counts.
+        """
+        probable = self.posterior.probable_causes()
+        if self.inferred.exhausted:
+            probable = [c for c in probable if c.name not in catalogue()]
+        return tuple(probable)
 
     @cached_property
     def untracked_turns(self) -> tuple[tuple[int, int], ...]:
@@ -202,7 +209,7 @@ def explain(
     begin = None if before is None else _starting_causes(before)
     found = Inference(fit).run(begin)
     posterior = _calculate_posterior(found)
-    for _ in range(MAX_RESUMPTIONS):
+    for _ in range(0 if found.exhausted else MAX_RESUMPTIONS):
         better, now = found.search.best_visited, found.best
         # the same causes, with shapes between the grid points, are no improvement
         if found.search.sets.corrected_score(better) <= now.score + (

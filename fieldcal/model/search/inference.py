@@ -18,7 +18,7 @@ from fieldcal.model.evidence.sizing import Member, keys_of
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportional_offsets import proportional_causes
 from fieldcal.model.search.refinement import Refinement
-from fieldcal.model.search.selection import MIN_LOG_RISE, Search
+from fieldcal.model.search.selection import MIN_LOG_RISE, Search, is_exhausted
 from fieldcal.model.search.starting_sets import starting_sets
 from fieldcal.model.search.variations import drop_superfluous
 from fieldcal.model.state import State
@@ -60,6 +60,11 @@ class InferenceResult:
     turn_rows: Sequence[TurnRows]
     contradicted_turns: tuple[tuple[int, int], ...]
     visited_keys: frozenset[SetKey]
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether rows took so many causes that none of them counts."""
+        return is_exhausted(self.best)
 
     def independent_fit(self) -> GaussNewton:
         """A copy of the fit about this result, to which columns can be added."""
@@ -151,13 +156,16 @@ class Inference:
         """Update the state and search in turn, starting from the set `best`.
 
         If `thorough`, costly changes are tried once cheap ones find nothing. A set
-        whose key is in `visited_keys` ends it. The sets `rivals` are evaluated as well.
+        whose key is in `visited_keys` ends it, and one of too many causes is kept as it
+        is. The sets `rivals` are evaluated as well.
         """
         fit = self.fit
         members: tuple[Member, ...] = ()
         visited = set(visited_keys)
         earlier = dict.fromkeys(one.members for one in rivals)
         for _ in range(MAX_LINEARISATIONS):
+            if is_exhausted(best):
+                return self.hold(best.members)
             visited.add(Sets.key(best.members))
             if best.members != members:
                 members, state, values, best = self._settle_refined(state, values, best)

@@ -25,11 +25,21 @@ MIN_LOG_RISE = 0.02
 MAX_STEPS = 30
 """Steps of one search."""
 
+MAX_CAUSES = 12
+"""Causes with which a search ends: rows that take as many are of something else than
+this model, as of windows in which the device was turned, and each further one is paid
+with seconds. Recordings with known causes have up to four."""
+
 EVALUATED_OFFERS = 4
 """Offers that are evaluated in full, at each step."""
 
 PREDICTION_SLACK = 3.0
 """Log evidence that a full evaluation may add to the predicted score of an offer."""
+
+
+def is_exhausted(best: Set) -> bool:
+    """Whether a search ended at a set of so many causes that none of them counts."""
+    return len(best.members) >= MAX_CAUSES
 
 
 class Search:
@@ -60,6 +70,8 @@ class Search:
             if better is best:
                 break
             best = better
+            if is_exhausted(best):
+                break
         return self._prefer_effects(best)
 
     @property

@@ -24,6 +24,12 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
         " t=NAME,ax=NAME if the columns have names; with --join once for each FILE",
     )
     add("--rate", type=float, metavar="HZ", help="sampling rate, if no column is t")
+    add(
+        "--rate-sigma",
+        type=_parse_rate_sigma,
+        metavar="HZ",
+        help="what is not known of the rate, 1 sigma (default: 0.7 %% of it)",
+    )
     add("--separator", help="between columns (default: detected)")
     add("--skip", type=int, metavar="N", help="lines at the top (default: detected)")
     add("--acc-unit", default="", help="m/s^2, mm/s^2, cm/s^2, g, mg, ug, V, count")
@@ -94,3 +100,21 @@ def _parse_triad(text: str) -> tuple[float, ...]:
             f"{text!r} cannot be: write one number or three, such as 33000,32900,33100"
         )
     return numbers * (3 // len(numbers))
+
+
+def _parse_rate_sigma(text: str) -> float:
+    """Parse what is not known of a rate, Hz.
+
+    >>> _parse_rate_sigma("0.01")
+    0.01
+    """
+    try:
+        hz = float(text)
+    except ValueError:
+        hz = math.nan
+    if not 0 <= hz < math.inf:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} cannot be: write by how many Hz the rate may be wrong, such as"
+            " 0.01"
+        )
+    return hz

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
     from fieldcal.importing.session.ingest import ImportedSession
     from fieldcal.windows.joined_rests import RestPeriod
 
+CLOCK_SIGMA = 0.007
+"""Relative error of a nominal sampling rate, 1 sigma: nothing where a crystal counts,
+and 1 % where the IMU's own oscillator does, each as often. Such an oscillator is right
+within 2 % (limit in Linux's driver of TDK's ICM-426xx, inv_icm42600_timestamp.c, 2020;
+an LSM9DS1 of 476 Hz gave 469.6, github.com/FemmeVerbeek/Arduino_LSM9DS1 issue 17)."""
+
 LEAST_S = 1.0
 """Shortest rest that is one, whatever --still says, s: shorter means have no error."""
 
@@ -52,6 +58,14 @@ def import_imu(
         raise InputError(
             f"{recording.path}: --sigma says how well the rows of a table of means are"
             " known, and this is none: leave --sigma out"
+        )
+    if recording.wanted.rate_hz:
+        about["sampling"] = _counted_times(args, recording, folder)
+    elif args.rate_sigma is not None:
+        raise InputError(
+            f"{recording.path}: --rate-sigma says how well the rate is known by which"
+            " its times are counted, but it has times of its own: leave --rate-sigma"
+            " out"
         )
     with show_work(args, reading):
         imported = import_stream(recording, stream.name, folder, about, args.still)
@@ -108,9 +122,23 @@ def _stated_tables(args: argparse.Namespace, recording: Recording) -> dict[str, 
     units = {"acceleration": args.acc_unit, "angular_rate": args.gyr_unit}
     if kept := {k: u for k, u in units.items() if u in UNSCALED}:
         about["units"] = kept
-    if args.rate and recording.wanted.rate_hz:
-        about["sampling"] = {"rate_hz": args.rate}
     return about
+
+
+def _counted_times(
+    args: argparse.Namespace, recording: Recording, folder: Path
+) -> dict[str, float]:
+    """Table [sampling] of times that are counted from a rate; says what that means."""
+    rate = float(recording.wanted.rate_hz or 1.0)
+    if args.rate_sigma is not None:
+        return {"rate_hz": rate, "rate_sigma_hz": args.rate_sigma}
+    sys.stderr.write(
+        f"{folder}: its times are counted at {rate:g} Hz, which is taken for right"
+        f" within {CLOCK_SIGMA:.1%}, as clocks of sensors are: the scale factors of"
+        " gyroscopes that turns tell are no better; if the rate was measured, import"
+        " it again with --rate-sigma, its ± in Hz\n"
+    )
+    return {"rate_hz": rate, "rate_sigma_hz": float(f"{CLOCK_SIGMA * rate:.4g}")}
 
 
 def _tell_taken(

@@ -33,6 +33,7 @@ RARE = (
         "acc_lsb",
         "gyr_lsb",
         "acc_zero",
+        "rate_sigma",
     ),
     *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
     *("lot", "station", "operator", "keeps_gyro_bias", *FACTORY_KEYS),

@@ -69,6 +69,7 @@ class Experience:
     mounting : (3, 3) P, procedure = P device
     latitude : rad; nan where unknown
     gravity_sigma : m/s^2, what is not known of gravity, 1 sigma
+    clock_sigma : relative error of the times between two windows, 1 sigma
     attitude_sigma : (n,) rad about any axis, how well the position itself says that its
         turns are known; nan where it does not
 
@@ -106,6 +107,7 @@ class Experience:
     transport: Array
     alpha_axis: Array
     joint_turns: JointTurns = field(default_factory=JointTurns.none)
+    clock_sigma: float = 0.0
 
     @classmethod
     def at_rest(cls, alpha: Array, beta: Array, gravity: float, **known: Any) -> Self:

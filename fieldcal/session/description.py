@@ -33,6 +33,8 @@ class Description:
     grade : "consumer", "tactical", or "navigation" if the gyroscopes measure the
         Earth's rate
     rate_hz : nominal sampling rate, None where unknown
+    clock_sigma : relative standard deviation of the times, which were counted from the
+        rate; 0 if the device or a host measured them
     units : of "acceleration" and "angular_rate" in the samples
     limits : full scale of the same two, in SI; absent where unknown
     latitude_deg, height_m, gravity : the site; latitude_deg is None if it is not
@@ -66,6 +68,7 @@ class Description:
     device: Mapping[str, Any]
     grade: Grade
     rate_hz: float | None
+    clock_sigma: float
     units: Mapping[str, str]
     limits: Mapping[str, float]
     latitude_deg: float | None

@@ -85,6 +85,7 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
         raise InputError(wrong)
     raw = with_bare_names(raw)
     device, table = raw.get("device", {}), raw.get("site", {})
+    sampling = raw.get("sampling", {})
     given = raw.get("units", {})
     units = {k: given.get(k, next(iter(known))) for k, known in UNITS.items()}
     positions, windows = parse_positions(raw.get("position", ()))
@@ -102,7 +103,9 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
     return Description(
         device=json_values(device),
         grade=grade,
-        rate_hz=_optional_float(raw.get("sampling", {}).get("rate_hz")),
+        rate_hz=_optional_float(sampling.get("rate_hz")),
+        clock_sigma=float(sampling.get("rate_sigma_hz", 0.0))
+        / float(sampling.get("rate_hz", 1.0)),
         units=units,
         limits=full_scales(raw.get("range", {}), units, gauge),
         latitude_deg=site.latitude_deg,

@@ -25,6 +25,7 @@ from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.reliability import WrongAngles
 from fieldcal.solve.warnings import (
     agreement_warnings,
+    clock_warnings,
     closure_chi2,
     contradiction_warnings,
     level_warnings,
@@ -94,6 +95,7 @@ def _remarks(
         worst.sentence if worst else "",
         *notes,
         *level_warnings(method, options, observations),
+        *clock_warnings(estimate),
     ]
 
 

@@ -49,6 +49,8 @@ def undetermined_warnings(
         if not any(group_of(n) in OF_ACC for n in estimate.names):
             sentences.append(_force_length_warning(observations))
     gyr = [n for n in estimate.undetermined if group_of(n) == "gyr_scale"]
+    if estimate.parameter_set.x.clock_sigma >= thresholds.USEFUL_TURNED:
+        gyr = []  # no further turns would help: `clock_warnings`
     cross = [n for n in estimate.undetermined if group_of(n) == "gyro_cross_coupling"]
     if not estimate.parameter_set.options.gyr_scale and observations.has_gyr:
         sentences.append(
@@ -151,6 +153,18 @@ def level_warnings(
         "the base is assumed exactly level: a tilt of 0.1° would change a bias by up"
         f" to {moved:.3f} m/s² unnoticed; take five positions, or state how level it is"
         " (--level)"
+    ]
+
+
+def clock_warnings(estimate: ParameterEstimate) -> list[str]:
+    """Warning that times were counted, if turns determine gyroscopes by them."""
+    sigma = estimate.parameter_set.x.clock_sigma
+    if not sigma or not estimate.parameter_set.options.turned:
+        return []
+    return [
+        f"times were counted from a rate that is known to ± {100 * sigma:.2g} %: the"
+        " scale factors of the gyroscopes are known no better, and their ± includes it;"
+        " record with times, or measure the rate and state rate_sigma_hz in [sampling]"
     ]
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import GYR, Array
 from fieldcal.model.causes.basis import (
     CentralDifference,
     RowView,
@@ -40,6 +40,19 @@ def gravity(view: RowView) -> Array:
     """Derivative of the outputs by a relative change of gravity, (n, 6, 1)."""
     out: Array = view.state.scale * np.hstack([view.x.f, np.zeros_like(view.x.w)])
     return out[:, :, None]
+
+
+def clock(view: RowView) -> Array:
+    """Derivative of the outputs by a relative error of the times, (n, 6, 1).
+
+    A turn between known angles that a clock counts too many seconds for is taken for
+    slower than it was, so that the outputs are larger than for such a turn. Rates of a
+    device at rest are the Earth's, whatever its clock.
+    """
+    out = np.zeros((len(view.x), 6, 1))
+    if np.all(view.x.position < 0):
+        out[:, GYR, 0] = view.state.scale[GYR] * view.x.w
+    return out
 
 
 def speed(known: Array) -> Callable[[RowView], Array]:

@@ -34,6 +34,7 @@ from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.causes.random_causes import random_causes, series_flicker
 from fieldcal.model.causes.site_groups import (
+    clock_group,
     gravity_group,
     rounding_group,
     speed_group,
@@ -90,7 +91,7 @@ class Dictionary(ColumnTable):
         self.earth = self.attitude = -1
         self.always: list[Group] = [
             *self._calibration(), *gravity_group(self), *self._unoriented_earth(),
-            *self._attitudes(), *speed_group(self), *self._filters(),
+            *self._attitudes(), *speed_group(self), *self._clock(), *self._filters(),
             *rounding_group(self, shared_error),
         ]  # fmt: skip
         self.unoriented = np.array(
@@ -206,6 +207,10 @@ class Dictionary(ColumnTable):
         at = self.add(General("earth", columns.earth, columns.earth_sides), 3)
         self.earth = int(at[0])
         return at
+
+    def _clock(self) -> Iterator[Group]:
+        """Group of the error of counted times, if turns are used."""
+        yield from clock_group(self) if self.turns else ()
 
     def _unoriented_earth(self) -> Iterator[Group]:
         """Groups of the Earth's rate in positions of unknown orientation."""

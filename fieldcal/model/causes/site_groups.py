@@ -1,7 +1,8 @@
 """Permanent groups of the site and the set-up: what nobody knows exactly there.
 
 Gravity, the Earth's rate where the orientation is not known, speeds of a rate table
-whose axis is not known, and errors of rounding that all windows share.
+whose axis is not known, times that were counted from a nominal rate, and errors of
+rounding that all windows share.
 """
 
 from __future__ import annotations
@@ -60,6 +61,16 @@ def speed_group(table: ColumnTable) -> Iterator[Group]:
     error = np.array([table.x.speed_sigma[table.x.speed == v].max() for v in known])
     wide = np.hypot(error, EARTH_RATE / 3**0.5) / known
     yield Group("speed", "gyr", at, wide, fixed_size=1.0)
+
+
+def clock_group(table: ColumnTable) -> Iterator[Group]:
+    """Group of the error of times that were counted from a nominal sampling rate.
+
+    All gyroscopes share it during turns, where it looks like their scale factors.
+    """
+    if table.x.clock_sigma and table.has_gyroscopes:
+        at = table.add(General("clock", columns.clock), 1)
+        yield Group("clock", "gyr", at, np.array([table.x.clock_sigma]), fixed_size=1.0)
 
 
 def rounding_group(table: ColumnTable, sizes: Array | None) -> Iterator[Group]:

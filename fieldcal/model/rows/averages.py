@@ -151,6 +151,7 @@ def _experience(
         latitude=about.latitude,
         gravity_sigma=float(np.hypot(gravity_sigma(about), source.sway_gravity_sigma)),
         joint_turns=_joint_turns(source),
+        clock_sigma=about.clock_sigma,
         **known_attitudes(about, position),
     )
     return gyroscopes.with_earth_rates(x)

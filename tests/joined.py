@@ -12,10 +12,14 @@ from fieldcal.importing.session.joining import join_files
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.importing.units.settled_units import settle_units
 
+NOTHING_SAID = ReadOptions()
 
-def read_files(paths: Sequence[str | Path]) -> tuple[Block, list[str]]:
+
+def read_files(
+    paths: Sequence[str | Path], wanted: ReadOptions = NOTHING_SAID
+) -> tuple[Block, list[str]]:
     """Samples of files, which are joined where there are several, and what is said."""
-    opened = [open_recording(Path(path), ReadOptions()) for path in paths]
+    opened = [open_recording(Path(path), wanted) for path in paths]
     recording = join_files(opened) if len(opened) > 1 else opened[0]
     (stream,) = recording.streams()
     settle_units(recording, stream.name)

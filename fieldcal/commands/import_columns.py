@@ -41,7 +41,7 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
     add(
         "--time-unit",
         default="",
-        help="s, ms, us, ns, min, d, hhmmss …",
+        help="s, ms, us, ns, min, d, hhmmss …, or a tick: 0.1ms, 31.25us, 1/32768s",
     )
     add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")

@@ -10,6 +10,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
+from fieldcal.importing.words.tick_units import tick_seconds
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 TEMP_UNITS = {
@@ -127,7 +128,7 @@ class ReadOptions:
     @property
     def time_scale(self) -> float:
         """Seconds in one of the file's unit of time."""
-        return _unit(self.time_unit or "s", TIME_UNITS)
+        return seconds_in(self.time_unit or "s")
 
     @property
     def celsius(self) -> tuple[float, float]:
@@ -137,6 +138,25 @@ class ReadOptions:
         if name not in (known := TEMP_UNITS | own):
             raise InputError(f"unit {name!r} is none of: {', '.join(known)}")
         return known[name]
+
+
+def seconds_in(unit: str) -> float:
+    """Seconds in one of a unit of time, which may be so many of another: 31.25us.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+
+    """
+    if unit in TIME_UNITS:
+        return TIME_UNITS[unit]
+    if (seconds := tick_seconds(unit)) is None:
+        raise InputError(
+            f"unit {unit!r} is none of: {', '.join(TIME_UNITS)}; and it is not so many"
+            " of one, such as 31.25us or 1/32768s"
+        )
+    return seconds
 
 
 def _unit(unit: str, known: dict[str, float]) -> float:

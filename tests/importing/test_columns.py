@@ -291,7 +291,7 @@ def test_ticks_of_a_device_are_told_by_the_rate_or_by_their_name(
 @pytest.mark.parametrize(
     ("rate", "says"),
     [("50", ""), ("76", "its times make 50 Hz, not 76 Hz as you say"),
-     ("3000", "its times make 3000 Hz in no unit")],
+     ("3000", "its times make 3000 Hz in no usual unit")],
 )  # fmt: skip
 def test_a_rate_beside_times_tells_their_unit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], rate: str, says: str

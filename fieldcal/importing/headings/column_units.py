@@ -9,7 +9,7 @@ from shlex import quote
 
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.read_options import ReadOptions
-from fieldcal.importing.words.heading_units import TEMPERATURES, UNITS, parse_unit
+from fieldcal.importing.words.heading_units import TEMPERATURES, is_unit_of, parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 
 KINDS = {"a": ("ax", "ay", "az"), "g": ("gx", "gy", "gz"), "t": ("t",),
@@ -40,8 +40,9 @@ def units_over(columns: Sequence[Column], at: Mapping[str, int]) -> dict[str, st
     for kind, channels in KINDS.items():
         there = [at[c] for c in channels if at.get(c, len(columns)) < len(columns)]
         said = {_unit(columns[i]) for i in there}
-        if len(said) == 1 and (unit := said.pop()) in UNITS[kind]:
-            found[kind] = str(unit)
+        unit = said.pop() if len(said) == 1 else None
+        if unit is not None and is_unit_of(unit, kind):
+            found[kind] = unit
     return found
 
 

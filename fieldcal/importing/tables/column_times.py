@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing.columns import SKIP
-from fieldcal.importing.read_options import TIME_UNITS, ReadOptions, RowBatch
+from fieldcal.importing.read_options import ReadOptions, RowBatch, seconds_in
 from fieldcal.importing.times.row_times import CLOCK_PARTS, FRACTIONS, NEAR_STEPS
 from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit
@@ -155,11 +155,11 @@ def batch_options(
     """
     t = t[np.isfinite(t)]
     own = [] if shared.equal else time_units_of_bursts(t)
-    if any(shared.step * TIME_UNITS[unit] > COARSEST for unit in own):
+    if any(shared.step * seconds_in(unit) > COARSEST for unit in own):
         return None
     each = np.linspace(t[0], t[-1], len(t))  # as if every row had its own
     unit = wanted.time_unit or next(iter(possible_time_units(each)), "s")
-    seconds = shared.step * TIME_UNITS[unit]
+    seconds = shared.step * seconds_in(unit)
     if not shared.even or seconds > COARSEST or shared.rows < len("12"):
         return None
     return replace(wanted, time_unit=unit, batch=RowBatch(seconds, shared.rows))
@@ -168,7 +168,7 @@ def batch_options(
 def ask_rate_of_shared_times(wanted: ReadOptions, shared: SharedTimes, t: Array) -> str:
     """Ask for the rate where rows share times (n,), now more, now fewer."""
     unit = wanted.time_unit or next(iter(possible_time_units(t)), "s")
-    rate = shared.rows / (shared.step * TIME_UNITS[unit])
+    rate = shared.rows / (shared.step * seconds_in(unit))
     names = _without_times(wanted)
     return (
         f"its times step by {shared.step:g} {unit}, with about {shared.rows:.0f} rows"

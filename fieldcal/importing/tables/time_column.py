@@ -36,6 +36,7 @@ from fieldcal.importing.units.time_units import (
     RATE_TOLERANCE,
     TICKED,
     counts_from_long_ago,
+    tick_at_rate,
     time_unit_near_rate,
     time_unit_of_rate,
     time_unit_of_ticks,
@@ -202,9 +203,12 @@ class TimeColumn:
         """Options with the unit of times (n,) that a rate beside them tells."""
         unit, makes = time_unit_near_rate(t, rate)
         if not unit:
+            tick = tick_at_rate(t, rate)
+            count = f" add --time-unit {tick} if they count about so much, or"
             raise InputError(
-                f"{self._of.path}: its times make {rate:g} Hz in no unit: leave --rate"
-                " out, or name the columns with _ for that of the times"
+                f"{self._of.path}: its times make {rate:g} Hz in no usual unit: leave"
+                f" --rate out, or{count if tick else ''} name the columns with _ for"
+                " that of the times"
             )
         if unit != "s":
             self._of.guessed["time"] = f"{unit}: you say {rate:g} Hz"

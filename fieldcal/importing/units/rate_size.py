@@ -48,8 +48,9 @@ BIAS, STAYS = 0.5, 0.95
 """Bias that no gyroscope has, rad/s: 30 deg/s; and length of the mean of the directions
 of gravity, of which each has length 1, where it stays."""
 
-_LAG = 0.5
-"""Time over which (1) is integrated, s: jerks of a hand are shorter."""
+_LAG, _PAUSE, _LONGEST = 0.5, 1.5, 60.0
+"""Time over which (1) is integrated, s: jerks of a hand are shorter; usual steps of a
+slower log that are a pause; and the longest step over which a rate tells a turn, s."""
 
 
 def estimate_rate_unit(
@@ -208,7 +209,8 @@ class TurnSides(NamedTuple):
         if len(t) < MIN_ROWS:
             return None
         steps = np.diff(t)
-        steps[(steps > _LAG) | (steps < 0)] = np.nan
+        pause = max(_LAG, min(_PAUSE * float(np.median(steps)), _LONGEST))
+        steps[(steps > pause) | (steps < 0)] = np.nan
         step = float(np.nanmean(steps)) if np.isfinite(steps).any() else 0.0
         lag = max(2, round(_LAG / step)) if step > 0 else len(t)
         if len(t) < 4 * lag:

@@ -13,9 +13,10 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import IMPOSSIBLE_RATE_HZ, Array
-from fieldcal.importing.read_options import TIME_UNITS
+from fieldcal.importing.read_options import TIME_UNITS, seconds_in
 from fieldcal.importing.units.scales import MIN_ROWS_ALONE, rounded_text
 from fieldcal.importing.units.slow_times import turns_at_once
+from fieldcal.importing.words.tick_units import SECONDS
 
 RATES_HZ = (0.9, 8000.0)
 """What a logger of an IMU writes in a second: of 1 Hz, a clock shows a little less."""
@@ -120,7 +121,7 @@ def check_stated_times(name: str, unit: str, t: Array) -> None:
         have.
 
     """
-    step, size = _step(t), TIME_UNITS[unit]
+    step, size = _step(t), seconds_in(unit)
     if not step or STATED_HZ <= 1 / step <= RATES_HZ[1]:
         return
     finer = 1 / step < STATED_HZ
@@ -237,6 +238,22 @@ def time_unit_near_rate(t: Array, rate_hz: float) -> tuple[str, float]:
     away = {u: abs(np.log(rate / rate_hz)) for u, rate in rates.items()}
     unit = min(away, key=away.__getitem__, default="")
     return (unit, rates[unit]) if unit and away[unit] < ABOUT else ("", np.nan)
+
+
+def tick_at_rate(t: Array, rate_hz: float) -> str:
+    """So many of a unit as the times (n,) count, if they come at a rate.
+
+    "" of times that do not grow.
+
+    >>> tick_at_rate(np.arange(100) * 320.0, 100.0)
+    '31.25us'
+    """
+    if not (step := _step(t)):
+        return ""
+    length = 1 / (rate_hz * step)
+    names = (u for u, size in SECONDS.items() if length >= size)
+    unit = next(names, "ns")
+    return f"{rounded_text(length / SECONDS[unit], 6)}{unit}"
 
 
 def time_unit_of_ticks(t: Array) -> str:

@@ -14,6 +14,7 @@ from fieldcal.importing.recording import Recording
 from fieldcal.importing.units.gravity_size import GravityReading, estimate_gravity
 from fieldcal.importing.units.rate_size import compare_turns, estimate_rate_unit
 from fieldcal.importing.units.scales import ACC_SCALES, GYR_SCALES, Scale, rounded_text
+from fieldcal.importing.units.tick_answers import SI, tick_options
 from fieldcal.importing.units.turned_axes import NamedColumns
 from fieldcal.importing.units.unit_answers import zero_options
 from fieldcal.session.units import UNSCALED
@@ -169,10 +170,22 @@ class StatedUnits:
             return self._of_ticks(block, turned)
         fits = _within(turned / self._said.gyr_scale, GYR_SCALES)
         shows = f"rates are {turned:.4g} times those at which gravity turns"
-        other = (
-            self._said.rate_hz and f"--rate {rounded_text(self._said.rate_hz * turned)}"
-        )
-        return self._contradict("g", shows, "--gyr-unit", fits, other or "")
+        others = self._other_times(turned)
+        return self._contradict("g", shows, "--gyr-unit", fits, others)
+
+    def _other_times(self, turned: float) -> list[str]:
+        """Options for other times by which rates turn gravity as they say.
+
+        Parameters
+        ----------
+        turned : how many times those at which gravity turns the rates are
+
+        """
+        if rate := self._said.rate_hz:
+            return [f"--rate {rounded_text(rate * turned)}"]
+        if self._said.time_unit and "time" not in self._guessed:
+            return []
+        return tick_options(turned, self._said.time_scale, SI)
 
     def _of_ticks(self, block: Block, turned: float) -> list[str]:
         """Times of a guessed unit in which rates are out by more than a factory leaves.
@@ -209,13 +222,18 @@ class StatedUnits:
         return bool(unit) and what not in self._guessed and unit not in UNSCALED
 
     def _contradict(
-        self, kind: str, shows: str, option: str, fits: list[str], other: str = ""
+        self,
+        kind: str,
+        shows: str,
+        option: str,
+        fits: list[str],
+        others: Sequence[str] = (),
     ) -> list[str]:
         """Ask about a unit of the file's; of the user's only say what is odd."""
         unit = self._unit(kind)
         if kind not in self._said.named:
             return [f"{unit} as you say, but {shows}"]
-        answers = [other] if other else []
+        answers = [*others]
         answers += [f"{option} {one}" for one in fits if one != unit]
         answers.append(f"{option} {unit}, if it is so")
         raise InputError(

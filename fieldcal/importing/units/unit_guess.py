@@ -29,6 +29,7 @@ from fieldcal.importing.units.scales import (
     ANALOG,
     GYR_OUT,
     MIN_ROWS_ALONE,
+    USUAL_COUNTS,
     Scale,
     binary_counts,
     fitting_scales,
@@ -43,6 +44,7 @@ from fieldcal.importing.units.thermometers import (
     temperature_counts,
     temperature_fits,
 )
+from fieldcal.importing.units.tick_answers import tick_options, unknown_tick_option
 from fieldcal.importing.units.time_units import (
     assumed_time_unit,
     check_stated_times,
@@ -236,12 +238,15 @@ class UnitGuess:
             fits = counts
         # some write gains of angle beside the force itself; a wrong rate comes near
         fits = fits or self._angle_gains(reads, GYR_OUT[0])
+        ticks = self._ticks(reads, fits, gyr)
+        fits = [] if ticks else fits
         shows = f"as gravity turns, 1 rad/s reads {rounded_text(reads, 4)}"
         shows = f"{HALVED}; {shows}" if self._halved else shows
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
-                unit_options("gyr", fits, "deg/s", np.deg2rad(reads))
+                ticks
+                + unit_options("gyr", fits, "deg/s", np.deg2rad(reads))
                 + (
                     rate_options(reads, self.said.rate_hz or 0, gyr) if not fits else []
                 ),
@@ -249,6 +254,26 @@ class UnitGuess:
         if (fits[0].unit, fits[0].lsb) != ("rad/s", 1):
             self.found["angular_rate"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
+
+    def _ticks(self, reads: float, fits: list[Scale], gyr: Array) -> list[str]:
+        """Options for times of which nothing says what they count.
+
+        Rates with decimals are no counts: rather than in these, they are in a usual
+        unit beside times in another than was assumed.
+        """
+        decimals = bool((gyr != np.round(gyr)).any())
+        if self._times_are_said or (fits and (fits[0].lsb == 1 or not decimals)):
+            return []
+        known = {} if decimals else {"scales": USUAL_COUNTS}
+        usual = tick_options(reads, self.said.time_scale, **known)
+        if usual or fits:
+            return usual
+        return [unknown_tick_option(reads, self.said.time_scale)] if decimals else []
+
+    @property
+    def _times_are_said(self) -> bool:
+        """Whether the file or the user states what times count, or the rate."""
+        return bool(self._read.time_unit or self._read.rate_hz)
 
     def _angle_gains(self, reads: float, within: float) -> list[Scale]:
         """Scales of what an angle gains in a row, by what 1 rad/s reads in it."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from fieldcal.importing.words.tick_units import parse_tick
+
 SPELLINGS = {
     "m/s^2": ("m/s^2", "m/s2", "m/s²", "m/s/s", "m/s**2", "mps2", "m s-2", "ms-2",
               "m s^-2", "m/(s^2)", "m.s-2", "m.s^-2", "m/sec^2", "m/(sec^2)",
@@ -91,8 +93,8 @@ UNITS = {
 def parse_unit(text: str) -> str | None:
     """Parse a text as a unit, with or without brackets; None if it is none.
 
-    >>> [parse_unit(text) for text in (" (°/s)", "g", "rad per sec", "x")]
-    ['deg/s', 'g', 'rad/s', None]
+    >>> [parse_unit(text) for text in (" (°/s)", "g", "rad per sec", "0.1 ms", "x")]
+    ['deg/s', 'g', 'rad/s', '0.1ms', None]
     """
     bare = text.strip()
     # of "(m/(s^2))" the outer brackets, of "m/(s^2)" none
@@ -101,7 +103,16 @@ def parse_unit(text: str) -> str | None:
     if bare in CAPITALS:
         return CAPITALS[bare]
     bare = bare.lower().replace("/per/", "/").replace(" per ", "/")
-    return _WRITTEN.get(bare) or _WRITTEN.get(bare.strip("[]() "))
+    return _WRITTEN.get(bare) or _WRITTEN.get(bare.strip("[]() ")) or parse_tick(bare)
+
+
+def is_unit_of(unit: str, kind: str) -> bool:
+    """Whether a kind of channel may have a unit; of times, also so many of one.
+
+    >>> is_unit_of("0.1ms", "t"), is_unit_of("0.1ms", "a"), is_unit_of("g", "a")
+    (True, False, True)
+    """
+    return unit in UNITS[kind] or (kind == "t" and parse_tick(unit) is not None)
 
 
 def sensor_of_unit(text: str) -> str:

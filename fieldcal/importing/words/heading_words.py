@@ -18,6 +18,7 @@ from fieldcal.importing.words.heading_units import (
     TELLING,
     TEMPERATURES,
     UNITS,
+    is_unit_of,
     parse_unit,
     split_thermometer_name,
 )
@@ -131,7 +132,7 @@ weak=False, gain=False, half=False)
         return HeadingMeaning(whole, "", None)
     for bare, said in name_unit_splits(name, unit):
         found = _meaning_of_words([w.lower() for w in _WORD.findall(bare)], said)
-        if found is None or (said is not None and said not in UNITS[found.kind]):
+        if found is None or (said is not None and not is_unit_of(said, found.kind)):
             continue
         if found.kind or said is not None:
             found = _as_angle_rate(found)
@@ -304,7 +305,7 @@ def _step_meaning(words: list[str], unit: str | None) -> HeadingMeaning | None:
 
 def _time_meaning(words: list[str], unit: str | None) -> HeadingMeaning | None:
     """The meaning of a time: by its name, or by a unit of time that is all of it."""
-    said = unit if unit in UNITS["t"] else None
+    said = unit if unit and is_unit_of(unit, "t") else None
     named = [w for w in words if w in TIMES]
     rest = [w for w in words if w not in TIMES]
     inner = [w for w in rest if parse_unit(w) in UNITS["t"]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fieldcal.importing.words.heading_units import UNITS
+from fieldcal.importing.words.heading_units import is_unit_of
 from fieldcal.importing.words.heading_words import heading_meaning, words_in_name
 from fieldcal.importing.words.name_and_unit import name_unit_splits
 
@@ -39,4 +39,5 @@ def is_other_quantity(name: str) -> bool:
     if said is not None:
         return said.kind == "temperature"
     units = {unit for _, unit in name_unit_splits(name, "") if unit}
-    return bool(units - {*UNITS["t"]} or {*words_in_name(name)} & {*TURNED})
+    others = {unit for unit in units if not is_unit_of(unit, "t")}
+    return bool(others or {*words_in_name(name)} & {*TURNED})

@@ -204,8 +204,10 @@ def describe_units(wanted: ReadOptions) -> str:
 
 
 def unit_notes(wanted: ReadOptions) -> dict[str, object]:
-    """Entries about units for the session."""
+    """Entries about units for the session, and by what steps numbers are rounded."""
+    steps = {"acc": wanted.acc_scale, "gyr": wanted.gyr_scale, "cut": True}
     return {
+        **({"grain": steps} if wanted.cut else {}),
         "acc_unit": wanted.acc_unit or "m/s^2",
         "acc_lsb": wanted.acc_lsb,
         "acc_zero": list(wanted.acc_zero),

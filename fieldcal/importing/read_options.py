@@ -78,6 +78,8 @@ class ReadOptions:
     tick : step of a clock too coarse for its rows, in its unit; 0 of others
     written_again : whether each of them was written several times
     usual : unit of rates that such names of columns have; "" where they tell none
+    usual_acc : the same of accelerations
+    cut : whether the numbers are whole ones, cut toward zero
     free : whether the names of accelerations are those of ones without gravity
     no_gain : whether names say accelerations, and so no gains of velocity
     means : whether rows are means, of which the user says how well they are known
@@ -104,6 +106,8 @@ class ReadOptions:
     tick: float = 0.0
     written_again: bool = False
     usual: str = ""
+    usual_acc: str = ""
+    cut: bool = False
     free: bool = False
     no_gain: bool = False
     acc_zero: tuple[float, ...] = ()

@@ -68,6 +68,7 @@ class HeadingMatch:
     reversed : channels whose sign is the other one, by what writes such names
     free : whether its accelerations are called as those without gravity are
     no_gain : whether names say accelerations, and so no gains of velocity
+    usual_acc : unit that accelerations of such names are in; "" where names tell none
 
     """
 
@@ -79,6 +80,7 @@ class HeadingMatch:
     reversed: frozenset[str] = frozenset()
     free: bool = False
     no_gain: bool = False
+    usual_acc: str = ""
 
     def taken(self, wanted: ReadOptions) -> ReadOptions:
         """Return what the user says, with what the names say."""
@@ -98,6 +100,7 @@ class HeadingMatch:
             reversed=wanted.reversed | self.reversed,
             free=self.free,
             no_gain=self.no_gain,
+            usual_acc=self.usual_acc,
         )
 
     def sentence(

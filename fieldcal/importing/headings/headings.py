@@ -55,11 +55,14 @@ CLOCK_PARTS = ("t_h", "t_min")
 
 OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "arrived",
                "log", "receive", "received", "recv", "reception", "rx",
-               "recorded")  # fmt: skip
+               "recorded", "meta")  # fmt: skip
 """Words of times that are another clock's than the device's."""
 
 ACCELERATION = ("acc", "beschl")
 """Beginnings of words that say acceleration, and no gain of velocity."""
+
+MAVLINK_FORCES = ("xacc", "yacc", "zacc")
+"""Fields of MAVLink's messages: mg in SCALED_IMU, and as ArduPilot fills RAW_IMU."""
 
 ANGLES = ("roll", "pitch", "yaw", "heading", "azimuth", "euler", "quat", "quaternion")
 """Words of what a filter computes of an attitude."""
@@ -334,10 +337,14 @@ def _match(
     half = any(n.says.half for n in chosen)
     usual = HALF_ANGLE if half else "rad/s" if ros else ""
     felt = [n for n in chosen if n.says.kind == "a" and not n.says.gain]
+    mavlink = felt and all(
+        {*MAVLINK_FORCES} & {*words_in_name(columns[n.number].name)} for n in felt
+    )
     free = any(n.says.weak for n in felt)
     # "a" alone may be short for anything
     words = [w for n in felt for w in words_in_name(columns[n.number].name)]
     no_gain = free or any(w.startswith(ACCELERATION) for w in words)
     return HeadingMatch(
-        tuple(found), units, name, says, usual, reversed_, free, no_gain
-    )
+        tuple(found), units, name, says, usual, reversed_, free, no_gain,
+        "mg" if mavlink else "",
+    )  # fmt: skip

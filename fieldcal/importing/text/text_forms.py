@@ -4,6 +4,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     "1,714,746"  1 714 746  1'714'746  thousands that are set apart
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
     Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
+    RAW_IMU {time_usec : 5, xacc : 3}  messages of MAVLink as mavlogdump shows them
     IMU:0.1,0.2,9.8,0,0,0              a word before the columns
     AcX,12,AcY,-45,AcZ,16384           values behind cells with their names
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
@@ -53,6 +54,7 @@ from fieldcal.importing.text.line_forms import (
     WordPrefix,
 )
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
+from fieldcal.importing.text.mavlink_text import MavlinkText
 from fieldcal.importing.text.nested_values import NestedValues
 from fieldcal.importing.text.paired_cells import PairedCells
 from fieldcal.importing.text.rate_on_top import RateOnTop
@@ -258,8 +260,8 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, LabviewText, ScaledCounts, RateOnTop, ReceiverLines, VectorNavLines,
-    ZephyrLines, SaulLines,
+    DataflashText, MavlinkText, LabviewText, ScaledCounts, RateOnTop,
+    ReceiverLines, VectorNavLines, ZephyrLines, SaulLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
     QuotedCells, SpacedCells, PairedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, WordPrefix, BarTable, ListCells,

@@ -94,7 +94,8 @@ def guess_unit_of_calm_rates(
         writes the other's so too
 
     """
-    plain = [s for s in (RAD, DEG) if not usual or s.unit == usual] + [RAD, DEG]
+    named = [s for s in GYR_SCALES if s.lsb == 1 and s.unit == usual]
+    plain = [*named, RAD, DEG]
     if step is not None and usual == HALF_ANGLE:
         plain = [*half_angle_scales(step)]
     elif step is not None:

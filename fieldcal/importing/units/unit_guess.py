@@ -71,6 +71,9 @@ OFFSET = 0.25
 """Part of g that no bias is: what raw counts show more is where their zero lies."""
 
 
+BESIDE = {"mg": "mrad/s"}
+"""Unit of the rates that programs write beside accelerations in another."""
+
 PLAIN_UNITS = ["--acc-unit m/s^2", "--acc-unit g"]
 """What accelerations are in, where their lengths tell nothing."""
 
@@ -137,12 +140,15 @@ class UnitGuess:
         if gravity:
             said_units = StatedUnits(name, self.said, self.found, columns)
             self.doubts += said_units.doubts(block, gravity)
+        if self.said.usual_acc and self.said.usual_acc == self.said.acc_unit:
+            self.said = replace(self.said, cut=_are_whole(written / said.acc_scale))
         if not said.temp_unit:
             self._temperature(block.temperature)
 
     def on(self, wanted: ReadOptions) -> ReadOptions:
         """Options of a part with what was found."""
         found = self.said
+        wanted = replace(wanted, cut=found.cut)
         if "time" in self.found:
             wanted = replace(wanted, time_unit=found.time_unit)
         if "acceleration" in self.found:
@@ -159,6 +165,10 @@ class UnitGuess:
         shows = f"|a| at rest is {rounded_text(gravity.size, 4)}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
+        named = [scale for scale in fits if str(scale) == self.said.usual_acc]
+        if named and len(fits) > 1:
+            fits = named
+            shows += ", and so are accelerations of such names"
         if not fits and gravity.size >= NO_UNIT and (lsb := binary_counts(acc)):
             fits = [scale for scale in ACC_SCALES if str(scale) == "g"]
             shows += f", and its steps are those of {lsb} counts in a g"
@@ -298,7 +308,10 @@ class UnitGuess:
         turns = gravity and compare_turns(block.t, block.acc, block.gyr, gravity)
         gained = self._step if self._gained or self._halved else None
         counts = self.said.acc_lsb != 1 and gained is None
-        found = guess_unit_of_calm_rates(gyr, turns, gained, self.said.usual, counts)
+        usual = self.said.usual
+        if self.said.usual_acc and self.said.usual_acc == self.said.acc_unit:
+            usual = BESIDE[self.said.usual_acc]
+        found = guess_unit_of_calm_rates(gyr, turns, gained, usual, counts)
         if found.scale is None:
             self._ask(found.asks, [*found.answers])
         else:
@@ -343,3 +356,9 @@ class UnitGuess:
 
     def _ask(self, what: str, answers: list[str]) -> None:
         raise InputError(f"{self._name}: {what}: add {' or '.join(answers)}")
+
+
+def _are_whole(values: Array) -> bool:
+    """Whether numbers (n, 3) are whole, as fields of whole numbers are."""
+    known = values[np.isfinite(values)]
+    return bool(len(known) and np.allclose(known, np.round(known), rtol=0, atol=1e-6))

@@ -1,14 +1,19 @@
 """What a line with labels is called says its sensor, or which device wrote it."""
 
 import warnings
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.text.label_spellings import plain_labels
+from fieldcal.importing.text.labels import labelled_values
 
 RATE, ROWS = 20.0, 80
 TURN = 0.02 * np.arange(ROWS)
@@ -160,3 +165,101 @@ def test_another_message_between_rows_gives_them_no_time(tmp_path: Path) -> None
     (block,) = read(tmp_path, lines, True).values()
     np.testing.assert_allclose(block.t, np.arange(ROWS) / RATE, atol=1e-6)
     np.testing.assert_array_equal(block.acc, FORCE)
+
+
+def listened(topic: str, fields: list[str], instances: int = 1) -> list[str]:
+    """Messages of a topic as the shell of PX4 shows them, field by field."""
+    found = []
+    for i in range(ROWS):
+        found += ["", f"TOPIC: {topic}"]
+        for k in range(instances):
+            found += [f"Instance {k}:"] if instances > 1 else []
+            found += [
+                f" {topic}",
+                f"    timestamp: {5_000_000 + round(i * 1e6 / RATE)} (0.003524 seconds"
+                " ago)",
+                f"    timestamp_sample: {4_999_800 + round(i * 1e6 / RATE)}  (208 us"
+                " before timestamp)",
+                f"    device_id: {2752786 + k} (Type: 0x2A, SPI:2 (0x01))",
+                *(f"    {one}" for one in fields),
+                "    error_count: 0",
+            ]
+            force, rate = FORCE[i] * (1 + 0.1 * k), RATES[i]
+            values = dict(zip(("ax", "ay", "az", "gx", "gy", "gz"),
+                              [*force, *rate], strict=True))  # fmt: skip
+            found = [line.format(**values) for line in found]
+    return found
+
+
+def test_messages_that_the_shell_of_px4_shows(tmp_path: Path) -> None:
+    """With what they hold besides, and how long ago they came behind their time."""
+    fields = ["gyro_rad: [{gx:.5f}, {gy:.5f}, {gz:.5f}]", "gyro_integral_dt: 50000",
+              "accelerometer_timestamp_relative: 0",
+              "accelerometer_m_s2: [{ax:.5f}, {ay:.5f}, {az:.5f}]",
+              "accelerometer_clipping: 0"]  # fmt: skip
+    (block,) = read(tmp_path, listened("sensor_combined", fields), True).values()
+    np.testing.assert_allclose(np.diff(block.t), 1 / RATE * 1e6)
+    np.testing.assert_allclose(block.acc, FORCE, atol=1e-9)
+    np.testing.assert_allclose(block.gyr, RATES, atol=1e-9)
+
+
+def test_titles_number_the_devices_of_what_stands_below(tmp_path: Path) -> None:
+    fields = ["x: {ax:.5f}", "y: {ay:.5f}", "z: {az:.5f}", "temperature: 38.4425"]
+    got = read(tmp_path, listened("sensor_accel", fields, 2), True)
+    assert [*got] == ["Instance 0", "Instance 1"]
+    for k, block in enumerate(got.values()):
+        np.testing.assert_allclose(block.acc, FORCE * (1 + 0.1 * k), atol=1e-4)
+        np.testing.assert_allclose(block.temperature, 38.4425)
+
+
+@pytest.mark.parametrize(
+    "form",
+    ["accel [g]: {:.5f} {:.5f} {:.5f} gyro [deg/s]: {:.5f} {:.5f} {:.5f}",
+     "Accel (g): X={:.5f} Y={:.5f} Z={:.5f} | Gyro (deg/s): X={:.5f} Y={:.5f} Z={:.5f}",
+     "Accel [g]:\n x: {:.5f}\n y: {:.5f}\n z: {:.5f}\nGyro [deg/s]:\n x: {:.5f}\n"
+     " y: {:.5f}\n z: {:.5f}"],
+    ids=["lists", "axes", "titles"],
+)  # fmt: skip
+def test_a_unit_in_brackets_stands_before_the_values(tmp_path: Path, form: str) -> None:
+    """One of rates is no rad of which the unit is s."""
+    values = np.hstack([FORCE / 9.80665, np.rad2deg(RATES)])
+    lines = "\n".join(form.format(*row) for row in values).split("\n")
+    (block,) = read(tmp_path, lines, timed=False).values()
+    np.testing.assert_allclose(block.acc, FORCE, atol=1e-4)
+    np.testing.assert_allclose(block.gyr, RATES, atol=1e-6)
+
+
+def test_counts_beside_what_they_are_in_a_unit(tmp_path: Path) -> None:
+    values = np.hstack([FORCE / 9.80665, np.rad2deg(RATES)])
+    units = ["g"] * 3 + ["dps"] * 3
+    lines = [
+        " ".join(
+            f"{name}: {round(16384 * x)} ({x:.6f} {unit})"
+            for name, x, unit in zip(
+                ("AX", "AY", "AZ", "GX", "GY", "GZ"), row, units, strict=True
+            )
+        )
+        for row in values.tolist()
+    ]
+    (block,) = read(tmp_path, lines, timed=False).values()
+    np.testing.assert_allclose(block.acc, FORCE, atol=1e-5)
+    np.testing.assert_allclose(block.gyr, RATES, atol=1e-6)
+
+
+@given(st.integers(0, 86399), st.integers(0, 999_999), st.booleans())
+def test_a_clock_behind_a_label_is_so_many_seconds(
+    second: int, micros: int, dated: bool
+) -> None:
+    clock = datetime(2024, 5, 3, tzinfo=UTC) + timedelta(
+        seconds=second, microseconds=micros
+    )
+    form = "%Y-%m-%d %H:%M:%S.%f" if dated else "%H:%M:%S.%f"
+    read_time = labelled_values(f"Time: {clock.strftime(form)}, ax: 1, ay: 2")[0]
+    assert read_time[0] == "Time"
+    since = clock.timestamp() if dated else second + 1e-6 * micros
+    assert float(read_time[1]) == pytest.approx(since, abs=2e-6)
+
+
+@given(st.text(alphabet="ax=:0123456789.()[] gT-", max_size=40))
+def test_no_line_breaks_the_spelling_of_labels(line: str) -> None:
+    assert isinstance(plain_labels(line), str)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from shlex import quote
 from typing import Any
@@ -43,7 +44,9 @@ from fieldcal.importing.tables.known_channels import (
     named_channels,
 )
 from fieldcal.importing.tables.means import row_scatter, scatter_columns
+from fieldcal.importing.tables.own_times import OwnTimes, SensorsApart, own_times
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
+from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.importing.words.heading_words import heading_meaning
 
 
@@ -56,6 +59,9 @@ class ColumnRecording(Recording):
 
     in_turn = False
     """Whether its rows hold the accelerometer or the gyroscope, as far as is known."""
+
+    _own_times: OwnTimes | None = None
+    """Times of each sensor, where they are not the same."""
 
     told_by = NAMES
     """What says the sensor of its columns."""
@@ -124,12 +130,34 @@ class ColumnRecording(Recording):
         if len(self.imus()) > 1:
             yield from self.alone(stream).blocks(stream)
             return
+        if self._own_times is not None:
+            yield from self._sensors_apart(self._own_times)
+            return
         rows = RowsInTurn(str(self.path), self.repair)
         for block in rows.through(self.read_samples()):
             self.in_turn = rows.told
             yield block
         self.says += [s for s in rows.says if s not in self.says]
         self.mended += [s for s in rows.mended if s not in self.mended]
+
+    def _sensors_apart(self, times: OwnTimes) -> Iterator[Block]:
+        """Samples of sensors that have times of their own, each with the nearest."""
+        both = []
+        for wanted in times.options(self.wanted):
+            one = copy(self)
+            one.says, one.mended, one.wanted, one.from_first = [], [], wanted, False
+            both.append(one)
+        judges = [RowValidator(str(one.path), one.place, one.repair) for one in both]
+        apart = SensorsApart(str(self.path), judges)
+        for block in apart.through(*(one.read_samples() for one in both)):
+            self.began = apart.began
+            since = apart.began if self.from_first and len(block) else 0.0
+            yield replace(block, t=block.t - since)
+        for one, judge in zip(both, judges, strict=True):
+            says, mended = [*one.says, *judge.says], [*one.mended, *judge.mended]
+            self.says += [s for s in says if s not in self.says]
+            self.mended += [s for s in mended if s not in self.mended]
+        self.says.append(apart.sentence)
 
     def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""
@@ -189,6 +217,9 @@ class ColumnRecording(Recording):
             taken = {"0": taken[named[0].name]}
             named = (replace(named[0], name="0"),)
         taken = {one.name: taken[one.name] for one in named}
+        if len(named) == 1 and way is not None and way.skip:
+            at = column_numbers(self, taken[named[0].name])
+            self._own_times = own_times(way.columns, at, table)
         rate = self.rate_said()
         for one in named:
             timed = rate is not None or holds_means(self, taken[one.name])

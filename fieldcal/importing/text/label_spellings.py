@@ -6,6 +6,9 @@ accel x,y,z: 0.1, 0.2, 9.8         accel x: 0.1 y: 0.2 z: 9.8
 acc_xyz: 0.1, 0.2, 9.8             acc: 0.1, 0.2, 9.8
 accel 0.1 0.2 9.8 m/s/s            accel: 0.1 0.2 9.8 m/s/s
 ax: 0.1 (m/s²) ay: 0.2 (m/s²)      ax: 0.1 m/s², ay: 0.2 m/s²,
+t: 5 (0.1 seconds ago)             t: 5
+ax: 8192 (0.5 g)                   ax: 0.5 g
+time: 14:20:31.5                   time: 51631.500000
 LSM6DSL [acc/mg]: 10, -2, 999      LSM6DSL acc [mg]: 10, -2, 999
 accel(0.1, 0.2, 9.8)               accel: 0.1, 0.2, 9.8
 accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}       Acc (mg) [ 10.1, -2.3, 999.1 ]
@@ -14,11 +17,19 @@ accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}       Acc (mg) [ 10.1, -2.3, 999.1 ]
 from __future__ import annotations
 
 import re
+from datetime import date
 
 from fieldcal.importing.text.repeated_lines import NUMBER
-from fieldcal.importing.words.heading_units import THERMOMETERS, parse_unit
+from fieldcal.importing.words.heading_units import (
+    THERMOMETERS,
+    parse_unit,
+    sensor_of_unit,
+)
 from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.importing.words.sensor_words import AXES
+
+EPOCH_DAY = date(1970, 1, 1).toordinal()
+"""Days from the year 1 to 1970."""
 
 MAX_UNIT_LETTERS = 18
 """Letters of a unit; what is longer is a sentence."""
@@ -33,8 +44,8 @@ _LISTED = re.compile(
 _WITH_UNIT = re.compile(r"\[([A-Za-z]+)/([^\[\]/]+)\](?=\s*[:=])")
 """What is measured and its unit, within brackets."""
 
-_FROM_AXIS = re.compile(r"([)\]])\s+-\s+(?=[xyzXYZ]\s*[:=])")
-"""A dash between a unit in brackets and the first axis."""
+_FROM_AXIS = re.compile(r"([)\]])(?:\s+-\s+|\s*:\s*)(?=[xyzXYZ]\s*[:=])")
+"""A dash or a colon between a unit in brackets and the first axis."""
 
 _DICT = re.compile(
     r"[{(]\s*"
@@ -54,6 +65,21 @@ _BEHIND = re.compile(
     rf"[(\[]([^()\[\]\d][^()\[\]]{{0,{MAX_UNIT_LETTERS}}})[)\]](?!\s*[:=\[])"
 )
 """A value with its unit in brackets behind it."""
+
+_REMARK = re.compile(rf"(?<=[\d)\]]) *\(\s*{NUMBER}(?: ?[A-Za-z]+){{2,}}\s*\)")
+"""A sentence in brackets behind a value: how long ago it was."""
+
+_CONVERTED = re.compile(
+    rf"(?<=[:=\s])[-+]?\d+\s*\(\s*({NUMBER})\s*"
+    rf"([^()\d\s][^()]{{0,{MAX_UNIT_LETTERS}}}?)\s*\)"
+)
+"""Counts, and in brackets what they are in a unit."""
+
+_CLOCK = re.compile(
+    r"(?<=[A-Za-z_\])])(\s*[:=]\s*)(?:(\d{4}-\d\d-\d\d)[T ])?"
+    r"(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)Z?(?![:.,]?\d)"
+)
+"""A time of a clock behind a label, also with its date."""
 
 _NAMES = re.compile(
     r"[(\[]?\b([A-Za-z_]\w*(?:\s*[,/]\s*[A-Za-z_]\w*)+)\s*[)\]]?\s*[:=]\s*"
@@ -89,7 +115,15 @@ def plain_labels(line: str) -> str:
     'accel x: 0.1 y: 0.2 z: 9.8 m/s^2, '
     >>> plain_labels("gx, gy, gz : 1, 2, 3 dps"), plain_labels("Acc (mg) [ 1, 2, 3 ]")
     ('gx: 1 gy: 2 gz: 3 dps', 'Acc (mg): 1, 2, 3')
+    >>> plain_labels("timestamp: 5020000 (0.003524 seconds ago)")
+    'timestamp: 5020000'
+    >>> plain_labels("ax: 8192 (0.5 g) ay: 0 (0.0 g)")
+    'ax: 0.5 g,  ay: 0.0 g, '
+    >>> plain_labels("t: 0:00:05.25, at: 2024-05-03T14:20:31.5")
+    't: 5.250000, at: 1714746031.500000'
     """
+    line = _CONVERTED.sub(_in_unit, line)
+    line = _CLOCK.sub(_in_seconds, _REMARK.sub("", line))
     line = _FROM_AXIS.sub(r"\1 ", _WITH_UNIT.sub(_unit_apart, line))
     line = _NAMES.sub(_pairs, line)
     line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
@@ -113,9 +147,28 @@ def _pairs(said: re.Match[str]) -> str:
     return " ".join(map("{}: {}".format, names, values)) + " "
 
 
+def _in_unit(said: re.Match[str]) -> str:
+    """Of counts beside what they are in a unit of a sensor, this."""
+    return f"{said[1]} {said[2]}, " if sensor_of_unit(said[2]) else said[0]
+
+
+def _in_seconds(said: re.Match[str]) -> str:
+    """A time behind a label in s: of the day, or since 1970 where its date is said."""
+    between, day, hours, minutes, seconds = said.groups()
+    since = 3600 * int(hours) + 60 * int(minutes) + float(seconds.replace(",", "."))
+    try:
+        days = date.fromisoformat(day).toordinal() - EPOCH_DAY if day else 0
+    except ValueError:
+        return said[0]
+    return f"{between}{86400 * days + since:.6f}"
+
+
 def _unit_apart(said: re.Match[str]) -> str:
-    """What is measured, with its unit alone in brackets."""
-    return f"{said[1]} [{said[2]}]" if parse_unit(said[2]) else said[0]
+    """What is measured, with its unit alone in brackets; of a unit alone itself."""
+    measured, unit = said.groups()
+    if parse_unit(f"{measured}/{unit}") or not parse_unit(unit):
+        return said[0]
+    return f"{measured} [{unit}]"
 
 
 def _bare_unit(said: re.Match[str]) -> str:

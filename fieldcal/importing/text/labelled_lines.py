@@ -8,6 +8,9 @@ G: t: 0.01 x: 1 y: 2 z: 3
 
 left: ax: 0.1 ay: 0.2 az: 9.8      names of lines with the same labels tell
 right: ax: 0.2 ay: 9.7 az: 0.1     devices apart
+
+Instance 0:                        a title that numbers devices says which the lines
+x: 0.1                             below it are of, down to the next
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Sequence
 
+from fieldcal.importing.text.instances import tells_devices
 from fieldcal.importing.text.labels import (
     CLOCKS,
     Labelled,
@@ -39,8 +43,12 @@ DEVICE = "device"
 MIN_LINES = 2
 """Lines of each device among the first."""
 
-_TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
+_TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\)|\[[^\[\]]*\])?)\W*")
 """A line that holds nothing but a name."""
+
+
+_NUMBERED = re.compile(r"\W*([A-Za-z]+)[ #_-]*(\d+)\W*")
+"""A title with a number."""
 
 
 class TitledValues:
@@ -52,6 +60,7 @@ class TitledValues:
     Attributes
     ----------
     titles : lines of that kind so far
+    devices : how often each device was named by a title
 
     >>> titled = TitledValues()
     >>> [titled.of(line) for line in ("--- Gyro (deg/s) ---", "X: 1 Y: 2")]
@@ -61,14 +70,17 @@ class TitledValues:
     """
 
     def __init__(self) -> None:
-        self._title = self._unit = ""
+        self._title = self._unit = self._device = ""
         self.titles = 0
+        self.devices: Counter[str] = Counter()
 
     def of(self, line: str) -> list[Labelled]:
         """Labels and values of the next line."""
         called, read = named_values(line)
         if called and _is_sensor(called):
             return _of_sensor(read, called, "")
+        if not read and self._names_device(line):
+            return []
         title = None if read else _TITLE.fullmatch(line)
         if title is not None:
             bare, unit = complete_label(" ".join(title[1].split()), [])
@@ -77,7 +89,18 @@ class TitledValues:
                 self.titles += 1
         if self._title:
             read = _of_sensor(read, self._title, self._unit)
-        return [(DEVICE, called), *read] if called and read else read
+        device = called or self._device
+        return [(DEVICE, device), *read] if device and read else read
+
+    def _names_device(self, line: str) -> bool:
+        """Whether a line is a title that numbers a device; its lines follow then."""
+        numbered = _NUMBERED.fullmatch(line)
+        if numbered is None or not tells_devices(numbered[1]):
+            return False
+        self._device = f"{numbered[1]} {numbered[2]}"
+        self.devices[self._device] += 1
+        self.titles += 1
+        return True
 
 
 class LabelledValues(TextForm):
@@ -104,7 +127,7 @@ class LabelledValues(TextForm):
         titled = TitledValues()
         read = [titled.of(line) for line in lines]
         many = [row for row in read if row]
-        devices = _devices(many)
+        devices = _devices(many) | _often(titled.devices)
         labels = {name for row in many for name, _ in row}
         stay = CLOCKS | {name for name in labels if _says_row(name)}
         names = repeated_labels(many, stay)
@@ -189,6 +212,12 @@ def _says_row(name: str) -> bool:
         return False
     said = heading_meaning(name.partition(" [")[0])
     return name == DEVICE or (said is not None and said.kind == "t")
+
+
+def _often(titles: Counter[str]) -> set[str]:
+    """Devices that titles number again and again, if there are several."""
+    several = len(titles) > 1 and min(titles.values()) >= MIN_LINES
+    return {*titles} if several else set()
 
 
 def _devices(rows: Iterable[Sequence[Labelled]]) -> set[str]:

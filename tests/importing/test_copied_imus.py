@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from laid_about import turned, write
-from scipy.signal import lfilter
+from scipy.ndimage import convolve1d
+from scipy.signal import butter, filtfilt, lfilter, medfilt, savgol_filter
 
 from fieldcal.cli import main
 from fieldcal.core.samples import CHANNELS, Array
@@ -73,3 +75,39 @@ def test_a_copy_is_found_whatever_the_filter(
     outputs = np.round(outputs / step) * step if step else outputs
     table = np.hstack([outputs, smoothed(outputs, part)])
     assert copied_imus(table, AT) == {"2": "1"}
+
+
+RUNNING_SUM = np.ones(15) / 15
+
+FILTERS: dict[str, Callable[[Array], Array]] = {
+    "forth and back": lambda x: filtfilt(*butter(2, 0.1), x, axis=0),
+    "forth and back, narrow": lambda x: filtfilt(*butter(4, 0.04), x, axis=0),
+    "once, from zero": lambda x: lfilter(*butter(2, 0.1), x, axis=0),
+    "mean about each row": lambda x: convolve1d(x, RUNNING_SUM, axis=0),
+    "polynomials": lambda x: savgol_filter(x, 21, 3, axis=0),
+    "median about each row": lambda x: medfilt(x, [9, 1]),
+}
+
+
+@pytest.mark.parametrize("filtered", FILTERS.values(), ids=FILTERS)
+@pytest.mark.parametrize("first", [False, True])
+def test_a_filter_may_know_later_samples(
+    filtered: Callable[[Array], Array], first: bool
+) -> None:
+    """Its steps hardly have the sign of what goes into it."""
+    outputs = turned(22, 100.0)[:, 1:]
+    pair = [outputs, filtered(outputs)]
+    table = np.column_stack([outputs[:, 0], *(pair[::-1] if first else pair)])
+    at = {i: {c: n + 1 for c, n in own.items()} for i, own in AT.items()}
+    assert copied_imus(table, at) == ({"1": "2"} if first else {"2": "1"})
+
+
+@given(st.integers(0, 2**20), st.floats(0.3, 1.0))
+@settings(max_examples=20)
+def test_two_devices_of_the_same_biases_are_two(seed: int, calmer: float) -> None:
+    """As those of a simulator that has none, turned together."""
+    rng = np.random.default_rng(seed)
+    truth = np.repeat(rng.normal(0, 5, (6, 6)), 200, axis=0)
+    noise = np.array([*[0.02] * 3, *[0.002] * 3])
+    pair = [truth + size * noise * rng.normal(size=truth.shape) for size in (1, calmer)]
+    assert copied_imus(np.hstack(pair), AT) == {}

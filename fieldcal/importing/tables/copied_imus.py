@@ -1,7 +1,13 @@
 """IMUs of a file that are no devices of their own: another one's samples, filtered.
 
 A program that writes raw and filtered axes under the same names makes two IMUs of one.
-Of two devices the biases differ; a filter keeps them, and follows the noise.
+Of two devices the biases differ; a filter keeps them, and makes its noise of the
+other's, whether it knows later samples or not:
+
+    dy[k] = sum over |j| <= K of h[j] dx[k + j] + rest                              (1)
+
+dx, dy steps from row to row of what goes into the filter and comes out of it, K rows.
+Of two devices at rest (1) explains nothing.
 """
 
 from __future__ import annotations
@@ -10,6 +16,8 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing.units.scales import MIN_ROWS
@@ -26,9 +34,15 @@ CALM = 6.0
 SAME = 0.99
 """Steps of a filtered output are smaller than this part of the other's."""
 
-FOLLOWS = 0.6
-"""Share of the steps of two sensors that have the same sign: 0.5 by chance, and more
-than 0.7 behind a filter that knows no later samples."""
+EXPLAINED = 0.3
+"""Part of the variance of dy that (1) explains beyond chance: nothing of two devices,
+0.4 behind a median of nine, and nearly all behind linear filters."""
+
+TINY = 1e-300
+"""Variance of steps that are none."""
+
+MOST_LAGS, ROWS_EACH, MOST_ROWS = 25, 20, 5000
+"""K at most, rows for each h[j] at least, and rows of (1) at most."""
 
 
 def copied_imus(table: Array, imus: Mapping[str, Mapping[str, int]]) -> dict[str, str]:
@@ -67,20 +81,51 @@ def _is_copied(one: Array, other: Array) -> bool:
     one, other = one[known], other[known]
     if len(one) < MIN_ROWS or not (np.ptp(one, axis=0) > 0).all():
         return False
-    away = other - one
+    steps = [np.diff(outputs, axis=0) for outputs in (one, other)]
+    quiet = _is_calm(steps[0]) & _is_calm(steps[1])
     # what a filter holds back of a turn is no noise
-    middle, spread = _middle_and_spread(away)
-    calm = (np.abs(away - middle) <= CALM * spread).all(axis=1)
-    if np.count_nonzero(calm) < MIN_ROWS:
+    away = (other - one)[1:][quiet]
+    away = away[_is_calm(away)] if len(away) else away
+    if len(away) < MIN_ROWS:
         return False
-    middle, spread = _middle_and_spread(away[calm])
-    error = MEDIAN_ERROR * spread / np.sqrt(np.count_nonzero(calm))
+    middle, spread = _middle_and_spread(away)
+    error = MEDIAN_ERROR * spread / np.sqrt(len(away))
     if (np.abs(middle) > NEAR * error).any():
         return False
-    steps = np.sign(np.diff(one, axis=0) * np.diff(other, axis=0))
-    both = np.count_nonzero(steps, axis=0)
-    follows = np.count_nonzero(steps > 0, axis=0) > FOLLOWS * np.maximum(both, 1)
-    return bool(follows.all())
+    # of a filter the smaller steps come out
+    sizes = [np.nanmedian(np.abs(x[quiet]).mean(axis=0)) for x in steps]
+    into, out = steps if sizes[0] >= sizes[1] else steps[::-1]
+    return _explains(into, out, quiet) > EXPLAINED
+
+
+def _is_calm(values: Array) -> NDArray[np.bool_]:
+    """Rows (n,) of values (n, k) that lie within their noise."""
+    middle, spread = _middle_and_spread(values)
+    return np.asarray((np.abs(values - middle) <= CALM * spread).all(axis=1))
+
+
+def _explains(into: Array, out: Array, quiet: NDArray[np.bool_]) -> float:
+    """Part of the variance of steps (n, k) that (1) explains beyond chance, of most.
+
+    Parameters
+    ----------
+    into, out : steps dx and dy
+    quiet : (n,) rows that are used, as far as dx is calm in all of |j| <= K
+
+    """
+    lags = min(MOST_LAGS, int(quiet.sum()) // (2 * ROWS_EACH))
+    whole = np.all(sliding_window_view(_is_calm(into), 2 * lags + 1), axis=1)
+    rows = np.flatnonzero(whole & quiet[lags : len(quiet) - lags])[:MOST_ROWS]
+    spare = len(rows) - (2 * lags + 1)
+    if spare < MIN_ROWS:
+        return 0.0
+    found = []
+    for dx, dy in zip(into.T, out[lags : len(out) - lags].T, strict=True):
+        design = sliding_window_view(dx, 2 * lags + 1)[rows]
+        filtered = np.linalg.lstsq(design, dy[rows], rcond=None)[0]
+        left = float(((dy[rows] - design @ filtered) ** 2).sum()) / spare
+        found.append(1 - left / max(float((dy[rows] ** 2).mean()), TINY))
+    return float(np.median(found))
 
 
 def _middle_and_spread(values: Array) -> tuple[Array, Array]:

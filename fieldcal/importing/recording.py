@@ -38,6 +38,9 @@ class MeanScatter(NamedTuple):
     values : (n, 6) likewise
     many : (n,) samples of each mean; None where not written
     timed : whether the table says when each was taken
+    speeds : (n,) rate of the table that turned the device, in `speed_unit`; None where
+        not written
+    speed_unit : that the table says, or nothing
 
     """
 
@@ -45,6 +48,8 @@ class MeanScatter(NamedTuple):
     values: Array
     many: Array | None
     timed: bool
+    speeds: Array | None = None
+    speed_unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)

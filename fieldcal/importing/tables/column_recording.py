@@ -43,8 +43,10 @@ from fieldcal.importing.tables.known_channels import (
     match_quality,
     named_channels,
 )
-from fieldcal.importing.tables.means import row_scatter, scatter_columns
+from fieldcal.importing.tables.means import row_scatter
 from fieldcal.importing.tables.own_times import OwnTimes, SensorsApart, own_times
+from fieldcal.importing.tables.scatter_columns import scatter_columns
+from fieldcal.importing.tables.table_speeds import speed_column, speed_unit
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.importing.words.heading_words import heading_meaning
@@ -166,10 +168,15 @@ class ColumnRecording(Recording):
             return None
         at = column_numbers(self, wanted)
         fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
-        where = scatter_columns(next(fits, Heading([])).columns)
+        named = next(fits, Heading([])).columns
+        where = scatter_columns(named)
         means, values = (_columns_of(table, places) for places in (at, where))
         count = table[:, where["n"]] if "n" in where else None
-        return MeanScatter(means, values, count, columns.has_time(wanted.columns))
+        timed, speed = columns.has_time(wanted.columns), speed_column(named)
+        if speed is None or speed in {i for c, i in at.items() if c != columns.SKIP}:
+            return MeanScatter(means, values, count, timed)
+        unit = speed_unit(named[speed])
+        return MeanScatter(means, values, count, timed, table[:, speed], unit)
 
     def row_sigma(self, gravity: float) -> float | None:
         """Standard deviation of its rows, m/s^2, if each may be a position."""

@@ -11,6 +11,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.tables.scatter_columns import scatter_columns
 from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.session.units import UNSCALED
 
@@ -50,12 +51,26 @@ def column_numbers(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:
 def holds_means(source: ColumnSource, wanted: ReadOptions) -> bool:
     """Whether rows are means, read with these options."""
     table, at = source.beginning(), column_numbers(source, wanted)
-    if not {"ax", "ay", "az"} <= set(at) or not len(table):
+    if not len(table):
         return False
+    if not {"ax", "gx"} & set(at):
+        return False
+    if "t" not in at and _says_means(source, table):
+        # on a table that turns, the same direction and rates come again and again
+        return True
+    if not {"ax", "ay", "az"} <= set(at):
+        return wanted.means
     t = table[:, at["t"]] * wanted.time_scale if "t" in at else None
     acc, gyr = ([at[k + x] for x in "xyz" if k + x in at] for k in "ag")
     rates = rates_in_degrees(table, gyr, wanted)
     return wanted.means or are_means(table[:, acc], t, rates)
+
+
+def _says_means(source: ColumnSource, table: Array) -> bool:
+    """Whether columns beside the outputs hold how much the samples of a row scatter."""
+    fits = (way for way in source.heading() if len(way.columns) == table.shape[1])
+    way = next(fits, None)
+    return way is not None and bool({*scatter_columns(way.columns)} - {"n"})
 
 
 def rates_in_degrees(

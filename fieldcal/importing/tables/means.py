@@ -12,7 +12,6 @@ they are, the deviation from row to row.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,18 +20,9 @@ from numpy.typing import NDArray
 from fieldcal.core.errors import InputError
 from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Index, concat
-from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.recording import MeanScatter, Recording
+from fieldcal.importing.tables.table_speeds import table_speeds, turned_rows
 from fieldcal.importing.units.gravity_size import estimate_gravity
-from fieldcal.importing.words.heading_words import (
-    SCATTER,
-    bare_axis,
-    heading_meaning,
-    words_in_name,
-)
-
-COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
-"""Names of a column that holds how many samples a mean is of."""
 
 COUPLED_PARAMETERS, PLAIN_PARAMETERS = 9, 6
 """Parameters of (1) with coupling and without."""
@@ -75,30 +65,6 @@ class MeanUncertainty(NamedTuple):
 
     sigma: Array
     why: str
-
-
-def scatter_columns(columns: Sequence[Column]) -> Mapping[str, int]:
-    """Columns that hold the scatter of a channel, or "n", by the channel.
-
-    A scatter that names no sensor, ``x_std``, is of the only one that there is.
-    """
-    found: dict[str, int] = {}
-    kinds = {
-        said.kind for c in columns if (said := heading_meaning(c.name, c.unit))
-    } & {*"ag"}
-    for i, column in enumerate(columns):
-        if column.name.strip().lower() in COUNTS:
-            found["n"] = i
-        elif (said := heading_meaning(column.name, column.unit)) and said.kind in (
-            "a",
-            "g",
-        ):
-            if set(said.label) & set(SCATTER):
-                found[said.kind + said.axis] = i
-        elif (alone := bare_axis(words_in_name(column.name))) and len(kinds) == 1:
-            if set(alone[1]) & set(SCATTER):
-                found[min(kinds) + alone[0]] = i
-    return found
 
 
 def estimate_mean_uncertainty(
@@ -316,6 +282,7 @@ def tables_of_means(
         found = estimate_mean_uncertainty(
             block.six, scatter.values[rows] * scale, many, gravity
         )
+    speeds = _speeds(recording, scatter, rows, block.gyr, found.sigma)
     if not np.isfinite(found.sigma[:, :3])[np.isfinite(block.acc)].all():
         raise InputError(
             f"{recording.path}: nothing says how well its {len(block)} means are known:"
@@ -328,8 +295,39 @@ def tables_of_means(
             "start_s": round(float(t) - half, 6),
             "end_s": round(float(t) + half, 6),
             "sigma": _list_of(row),
+            **({"speed_deg_s": round(float(speed), 9)} if speed > 0 else {}),
         }
-        for t, row in zip(block.t, found.sigma, strict=True)
+        for t, row, speed in zip(block.t, found.sigma, speeds, strict=True)
     ]
     guessed = {"guessed": {"sigma": found.why}} if found.why else {}
     return {"means": {"timed": scatter.timed}, "position": positions, **guessed}
+
+
+def _speeds(
+    recording: Recording, scatter: MeanScatter, rows: Index, gyr: Array, sigma: Array
+) -> Array:
+    """Rates of the table (n,) that turned the device, deg/s; 0 where it rested.
+
+    Where nothing says the rate of rows that turned, their rates are unknown in `sigma`
+    (n, 6), as they are no biases: it is said.
+    """
+    if scatter.speeds is not None:
+        said = scatter.speeds[rows]
+        speeds = table_speeds(said, scatter.speed_unit, gyr, str(recording.path))
+        return np.nan_to_num(np.rad2deg(speeds))
+    turned = turned_rows(gyr)
+    if turned.any():
+        fastest = float(np.rad2deg(np.nanmax(np.abs(gyr[turned]))))
+        odd = (
+            f"{int(turned.sum())} of its rows turned, at up to {fastest:.3g} deg/s, and"
+            " no column says the rate of the table: "
+        )
+        if not np.isfinite(sigma[turned, :3]).any():
+            raise InputError(
+                f"{recording.path}: {odd}write it into one, such as rate (deg/s)"
+            )
+        sigma[turned, 3:] = np.nan
+        recording.says.append(
+            f"{odd}their rates are not used; write it into one, such as rate (deg/s)"
+        )
+    return np.zeros(len(gyr))

@@ -142,7 +142,7 @@ def estimate_gravity(
     means = means or are_means(acc, t)
     acc = _readings(acc)
     if means:
-        return _gravity_of(acc)
+        return _gravity_of(acc) if len(acc) else None
     if len(acc) < MIN_ROWS_ALONE:
         return None
     # of so few, no part is quieter than the others

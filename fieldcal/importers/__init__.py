@@ -24,6 +24,12 @@ from fieldcal.importing.recording import Recording
 TRIED_LAST = ("csv_like", "wire")
 """Formats without a mark of their own, tried last, in this order."""
 
+UNPACKED = "phone_zip"
+"""Format of which a folder may hold the files."""
+
+SHOWN = 6
+"""Files of another folder that are named."""
+
 TIMES = "timestamps.txt"
 """File by which a folder of samples is read."""
 
@@ -65,7 +71,7 @@ def open_recording(
     if (path / TIMES).is_file():
         path = path / TIMES
     if path.is_dir():
-        raise InputError(f"{path}: is a folder; name the recording in it")
+        return _open_folder(path, wanted, repair)
     if path.is_char_device():
         raise InputError(f"{path}: is a device and has no end; name a file")
     if path.is_fifo():
@@ -89,3 +95,21 @@ def open_recording(
         f"{path}: is of no format that is known by its content: name one with --format"
         f" {'|'.join(formats())}"
     )
+
+
+def _open_folder(path: Path, wanted: ReadOptions, repair: bool) -> Recording:
+    """Open a folder of a telephone's files, one for each sensor.
+
+    Raises
+    ------
+    InputError
+        Of another folder, with what is in it.
+
+    """
+    module = import_module(f"{__name__}.{UNPACKED}")
+    if module.is_unpacked(path):
+        opened = plugin_class(module.__name__, Recording)  # type: ignore[type-abstract]
+        return opened(path, wanted, repair)
+    names = [str(path / name) for name in module.member_names(path)[:SHOWN]]
+    there = f", such as {' or '.join(names)}" if names else ""
+    raise InputError(f"{path}: is a folder; name the recording in it{there}")

@@ -1,4 +1,4 @@
-"""Archives of telephones: a .zip with a text file for each sensor.
+"""Archives of telephones: a .zip, or a folder, with a text file for each sensor.
 
 phyphox and the Sensor Logger of Android and iOS write ``Accelerometer.csv``,
 ``Gyroscope.csv`` and others, with one clock for all. The name of the file says the
@@ -53,14 +53,43 @@ DOWNWARDS = (
 def _platform(path: Path) -> tuple[str, bool]:
     """Platform that wrote an archive, and whether what it wrote was standardised."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            about = [n for n in archive.namelist() if Path(n).name.lower() == ABOUT]
-            text = archive.read(about[0]).decode("utf-8", "replace") if about else ""
+        about = [n for n in member_names(path) if Path(n).name.lower() == ABOUT]
+        text = _member(path, about[0]).decode("utf-8", "replace") if about else ""
     except (zipfile.BadZipFile, OSError, RuntimeError, ValueError):
         return "", False  # whoever reads the sensors says so
     said = next(csv.DictReader(text.splitlines()), {})
     platform, standard = (str(said.get(k)) for k in ("platform", "standardisation"))
     return platform.lower(), standard.lower() == "true"
+
+
+def member_names(path: Path) -> list[str]:
+    """Names of the files of an archive, or of a folder that it was unpacked to."""
+    if path.is_dir():
+        return sorted(one.name for one in path.iterdir() if one.is_file())
+    with zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+def _member(path: Path, name: str) -> bytes:
+    if path.is_dir():
+        return (path / name).read_bytes()
+    with zipfile.ZipFile(path) as archive:
+        return archive.read(name)
+
+
+def is_unpacked(folder: Path) -> bool:
+    """Whether a folder holds what such an archive does: a file of each sensor."""
+    stems = {_stem(name) for name in member_names(folder) if _is_text(name)}
+    whole = stems & {*ACC} or (stems & {*LINEAR} and stems & {*GRAVITY})
+    return bool(whole and stems & {*GYR, *GRAVITY, Path(ABOUT).stem})
+
+
+def _is_text(name: str) -> bool:
+    return name.lower().endswith(".csv")
+
+
+def _stem(name: str) -> str:
+    return Path(name).stem.lower().replace(" ", "")
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -81,6 +110,13 @@ class PhoneArchive(Recording):
         for text in self._opened().values():
             text.streams()
         return [ImuStream("0", f"columns in {columns.describe_units(self.wanted)}")]
+
+    def files(self) -> list[Path]:
+        """The archive, or the files of a folder that are read."""
+        if not self.path.is_dir():
+            return [self.path]
+        about = [n for n in member_names(self.path) if n.lower() == ABOUT]
+        return [self.path / name for name in (*self._members().values(), *about)]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return the units."""
@@ -196,14 +232,13 @@ class PhoneArchive(Recording):
 
         """
         try:
-            with zipfile.ZipFile(self.path) as archive:
-                names = [n for n in archive.namelist() if n.lower().endswith(".csv")]
+            names = [name for name in member_names(self.path) if _is_text(name)]
         except (zipfile.BadZipFile, OSError, RuntimeError, ValueError) as error:
             raise InputError(
                 f"{self.path}: cannot be read: {error}; copy it again from where it"
                 " came"
             ) from error
-        stems = {Path(n).stem.lower().replace(" ", ""): n for n in reversed(names)}
+        stems = {_stem(name): name for name in reversed(names)}
         gravity = next((stems[n] for n in GRAVITY if n in stems), None)
         forces = (*ACC, *(LINEAR if gravity else ()))
         acc = next((stems[n] for n in forces if n in stems), None)
@@ -214,6 +249,6 @@ class PhoneArchive(Recording):
                 f" Accelerometer.csv; unpack it and import the one that is: there are"
                 f" {', '.join(names[:12]) or 'no .csv files'}"
             )
-        whole = gravity is None or Path(acc).stem.lower().replace(" ", "") in TOTAL
+        whole = gravity is None or _stem(acc) in TOTAL
         parts = {} if whole else {"v": gravity or ""}
         return {"a": acc, **parts} | ({"g": gyr} if gyr else {})

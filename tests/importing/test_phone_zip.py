@@ -163,3 +163,37 @@ def test_a_wrong_time_of_the_gyroscope_costs_its_own_sample_alone(
     assert np.flatnonzero(np.isnan(block.gyr[:, 0])).tolist() == [at]
     known = np.arange(len(rows)) != at
     np.testing.assert_allclose(block.gyr[known], rows[known, 4:], atol=1e-8)
+
+
+@pytest.mark.parametrize("writes", [phyphox, sensor_logger])
+def test_a_folder_that_an_archive_was_unpacked_to_is_read_as_it(
+    writes: Callable[[Array], dict[str, str]], tmp_path: Path
+) -> None:
+    rows, folder = turned(1, RATE), tmp_path / "log"
+    with zipfile.ZipFile(packed(tmp_path, writes(rows))) as archive:
+        archive.extractall(folder)
+    assert main(["import", str(folder), "-o", str(tmp_path / "s")]) == 0
+    session = Session.open(tmp_path / "s")
+    np.testing.assert_allclose(session.block.acc, rows[:, 1:4])
+    np.testing.assert_allclose(session.block.gyr[:-1], rows[:-1, 4:])
+    marks = (tmp_path / "s" / "marks.jsonl").read_text()
+    assert "Gyroscope.csv" in marks
+
+
+def test_the_sign_of_ios_is_turned_in_a_folder_too(tmp_path: Path) -> None:
+    rows, folder = turned(1, RATE), tmp_path / "log"
+    folder.mkdir()
+    about = "version,platform,standardisation\n3,ios,false\n"
+    for name, content in (sensor_logger(rows) | {"Metadata.csv": about}).items():
+        (folder / name).write_text(content)
+    assert main(["import", str(folder), "-o", str(tmp_path / "s")]) == 0
+    np.testing.assert_allclose(Session.open(tmp_path / "s").block.acc, -rows[:, 1:4])
+
+
+def test_another_folder_is_refused_with_what_is_in_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "Inertial.csv").write_text("t,ax,ay,az\n")
+    assert main(["import", str(tmp_path), "-o", str(tmp_path / "s")]) == 2
+    assert "name the recording in it, such as" in (said := capsys.readouterr().err)
+    assert "Inertial.csv" in said

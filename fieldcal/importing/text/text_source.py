@@ -1,6 +1,6 @@
 """Whole lines of a text file as UTF-8, with what must be undone before columns.
 
-The text may be a file of a .zip. Lines come many at a time, so that a log may be as
+The text may be a file of a .zip or of a folder. Lines come many at a time, so that a log may be as
 long as it likes.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from zipfile import BadZipFile, ZipFile
 
 from fieldcal.core.errors import InputError
-from fieldcal.importing.files.gzip_stream import PIECE
+from fieldcal.importing.files.gzip_stream import PIECE, unpacked_pieces
 from fieldcal.importing.files.text_encoding import as_utf8
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.text.text_form import TextForm
@@ -31,7 +31,7 @@ class TextSource:
     Parameters
     ----------
     recording : whose file it is
-    member : the file of a .zip that is the text; "" if it is the file itself
+    member : the file of a .zip or folder that is the text; "" if it is the file itself
 
     """
 
@@ -97,6 +97,11 @@ class TextSource:
             yield from self._recording.pieces()
             return
         path = self._recording.path
+        if path.is_dir():
+            yield from unpacked_pieces(
+                path / self._member, PIECE, self._recording.cut_off
+            )
+            return
         try:
             with ZipFile(path) as archive, archive.open(self._member) as file:
                 while data := file.read(PIECE):

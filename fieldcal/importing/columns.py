@@ -31,7 +31,10 @@ SOME = 0.05
 WITHOUT_GRAVITY = ("lx", "ly", "lz")
 """Columns of an acceleration without gravity, where ``ax ay az`` are gravity alone."""
 
-KNOWN = (*SAMPLE_COLUMNS, "dt", *CLOCK_PARTS, *WITHOUT_GRAVITY)
+SPANS = {"a": "dv_us", "g": "da_us"}
+"""Columns of the time, us, over which velocity and angle were gained in a row."""
+
+KNOWN = (*SAMPLE_COLUMNS, "dt", *CLOCK_PARTS, *WITHOUT_GRAVITY, *SPANS.values())
 """What columns may be called."""
 
 
@@ -156,6 +159,8 @@ class ColumnReader:
                     sign = -1.0 if kind + "xyz"[i] in wanted.reversed else 1.0
                     with np.errstate(invalid="ignore"):  # of a nan that signals
                         np.multiply(signed, sign * scale, out=table[i])
+            if (span := columns.get(SPANS.get(kind, ""))) is not None:
+                table /= np.where(span > 0, 1e-6 * span, np.nan)
             return table.T
 
         acc = triad("a", wanted.acc_scale)

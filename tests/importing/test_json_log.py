@@ -216,12 +216,13 @@ FRAMES: dict[str, Any] = {
         "index": list(range(ROWS)),
         "data": [list(r.values()) for r in RECORDS],
     },
+    "rows below their names": [list(FRAME), *(list(r.values()) for r in RECORDS)],
     "table": {
         "schema": {"fields": [], "pandas_version": "1.4.0"},
         "data": [{"index": i, **r} for i, r in enumerate(RECORDS)],
     },
 }
-"""As `pandas.DataFrame.to_json` writes them."""
+"""As `pandas.DataFrame.to_json` writes them, and as tables are written by others."""
 
 
 @pytest.mark.parametrize("name", FRAMES)

@@ -203,6 +203,22 @@ def test_messages_that_the_shell_of_px4_shows(tmp_path: Path) -> None:
     np.testing.assert_allclose(block.gyr, RATES, atol=1e-9)
 
 
+@pytest.mark.parametrize("seconds", [1 / RATE, 0.005])
+def test_gains_are_those_of_the_time_that_stands_beside_them(
+    tmp_path: Path, seconds: float
+) -> None:
+    """The shell shows some of the messages: a row is not as long as they are."""
+    step = round(1e6 * seconds)
+    address = "device_id: 2752786 (Type: 0x2A, SPI:2 (0x01))"
+    fields = [f"accel_{address}", f"gyro_{address}",
+              "delta_angle: [{gx:.9f}, {gy:.9f}, {gz:.9f}]",
+              "delta_velocity: [{ax:.9f}, {ay:.9f}, {az:.9f}]",
+              f"delta_angle_dt: {step}", f"delta_velocity_dt: {step}"]  # fmt: skip
+    (block,) = read(tmp_path, listened("vehicle_imu", fields), True).values()
+    np.testing.assert_allclose(block.acc * seconds, FORCE, atol=1e-6)
+    np.testing.assert_allclose(block.gyr * seconds, RATES, atol=1e-6)
+
+
 def test_titles_number_the_devices_of_what_stands_below(tmp_path: Path) -> None:
     fields = ["x: {ax:.5f}", "y: {ay:.5f}", "z: {az:.5f}", "temperature: 38.4425"]
     got = read(tmp_path, listened("sensor_accel", fields, 2), True)

@@ -101,3 +101,13 @@ def test_a_rate_that_no_unit_makes_says_the_tick(tmp_path: Path) -> None:
 def test_a_unit_that_is_none_is_refused() -> None:
     with pytest.raises(InputError, match="such as 31.25us"):
         seconds_in("fortnight")
+
+
+def test_gains_of_angle_are_no_rates_beside_ticks(tmp_path: Path) -> None:
+    """Over 10 ms they seem to be rates beside times of 0.1 s."""
+    rows = counted(1e-6, scale=0.01)
+    names = [f"delta_{kind}_{axis}" for kind in ("velocity", "angle") for axis in "xyz"]
+    path = write(tmp_path, rows, heading=",".join(["timestamp", *names]))
+    block, _ = read_files([path])
+    np.testing.assert_allclose(block.acc, ROWS[:, 1:4], rtol=1e-3)
+    np.testing.assert_allclose(block.gyr, ROWS[:, 4:], rtol=1e-3)

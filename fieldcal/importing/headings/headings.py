@@ -61,6 +61,9 @@ OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "arri
 ACCELERATION = ("acc", "beschl")
 """Beginnings of words that say acceleration, and no gain of velocity."""
 
+GAIN_SPANS = ("dv_us", "da_us")
+"""Channels of the time over which velocity and angle were gained."""
+
 MAVLINK_FORCES = ("xacc", "yacc", "zacc")
 """Fields of MAVLink's messages: mg in SCALED_IMU, and as ArduPilot fills RAW_IMU."""
 
@@ -107,12 +110,14 @@ def match_headings(
     found = []
     for label in acc or gyr:
         both = [*acc.get(label, ()), *(rates[label] if acc else gyr[label])]
+        spans = [n for n in named if n.says.kind in GAIN_SPANS
+                 and any(one.says.gain for one in both)]  # fmt: skip
         warm, says = _thermometer(named, label)
         rest = _plainest([n for n in named if n.says.kind == "seq"], ())
         rest += [n for n in named if n.says.kind == "t_host"][:1]
         clock = _plainest(_columns_of_imu(times, label) or times, OTHER_CLOCK)
         clock = [_nearest_before(clock[0], times, both, columns)] if clock else steps
-        chosen = [*clock, *parts, *both, *apart, *warm, *rest]
+        chosen = [*clock, *parts, *both, *spans, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
     if left := [three for three in gyr.values() if acc and three not in rates.values()]:
         told = _left_out(list_names(columns, left[0]))

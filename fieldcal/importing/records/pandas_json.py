@@ -4,6 +4,7 @@
     {"0": {"ax": 0.1, "ay": 0.2}, "1": {...}}                  index
     {"columns": ["ax", "ay"], "index": [0, 1], "data": [[0.1, 0.2], ...]}      split
     {"schema": {...}, "data": [{"index": 0, "ax": 0.1}, ...]}                  table
+    [["ax", "ay"], [0.1, 0.2], ...]            rows below their names, as others write
 
 Each becomes a list of records. An index that does more than count rows is their time.
 """
@@ -34,6 +35,8 @@ def records_of_frame(document: Any) -> list[Record] | None:
     >>> records_of_frame({"ax": {"0": 1.5, "1": 2.5}, "ay": {"0": 3, "1": 4}})
     [{'ax': 1.5, 'ay': 3}, {'ax': 2.5, 'ay': 4}]
     """
+    if isinstance(document, list):
+        return _of_named_rows(document)
     if not isinstance(document, Mapping):
         return None
     if {"columns", "index", "data"} == {*document}:
@@ -65,6 +68,21 @@ def _of_split(document: Mapping[str, Any]) -> list[Record] | None:
         return None
     records = [dict(zip(map(str, names), row, strict=True)) for row in rows]
     return _with_index([str(one) for one in index], records)
+
+
+def _of_named_rows(rows: list[Any]) -> list[Record] | None:
+    """Records of lists of which the first holds the names of the others' values.
+
+    >>> _of_named_rows([["t", "ax"], [0.1, 9.8], [0.2, 9.7]])[1]
+    {'t': 0.2, 'ax': 9.7}
+    """
+    if len(rows) <= MIN_ROWS or not all(isinstance(row, list) for row in rows):
+        return None
+    names, *others = rows
+    named = bool(names) and all(isinstance(name, str) for name in names)
+    if not named or any(len(row) != len(names) for row in others):
+        return None
+    return [dict(zip(names, row, strict=True)) for row in others]
 
 
 def _with_index(index: Sequence[str], rows: list[Record]) -> list[Record]:

@@ -69,6 +69,9 @@ _BEHIND = re.compile(
 _REMARK = re.compile(rf"(?<=[\d)\]]) *\(\s*{NUMBER}(?: ?[A-Za-z]+){{2,}}\s*\)")
 """A sentence in brackets behind a value: how long ago it was."""
 
+_ADDRESS = re.compile(r"(?<=\d) *\((?=[^()]*0x)[^()]*(?:\([^()]*\)[^()]*)*\)")
+"""The address that a number stands for, in brackets behind it."""
+
 _CONVERTED = re.compile(
     rf"(?<=[:=\s])[-+]?\d+\s*\(\s*({NUMBER})\s*"
     rf"([^()\d\s][^()]{{0,{MAX_UNIT_LETTERS}}}?)\s*\)"
@@ -117,12 +120,14 @@ def plain_labels(line: str) -> str:
     ('gx: 1 gy: 2 gz: 3 dps', 'Acc (mg): 1, 2, 3')
     >>> plain_labels("timestamp: 5020000 (0.003524 seconds ago)")
     'timestamp: 5020000'
+    >>> plain_labels("device_id: 3670026 (Type: 0x38, SPI:1 (0x00))")
+    'device_id: 3670026'
     >>> plain_labels("ax: 8192 (0.5 g) ay: 0 (0.0 g)")
     'ax: 0.5 g,  ay: 0.0 g, '
     >>> plain_labels("t: 0:00:05.25, at: 2024-05-03T14:20:31.5")
     't: 5.250000, at: 1714746031.500000'
     """
-    line = _CONVERTED.sub(_in_unit, line)
+    line = _CONVERTED.sub(_in_unit, _ADDRESS.sub("", line))
     line = _CLOCK.sub(_in_seconds, _REMARK.sub("", line))
     line = _FROM_AXIS.sub(r"\1 ", _WITH_UNIT.sub(_unit_apart, line))
     line = _NAMES.sub(_pairs, line)

@@ -1,7 +1,7 @@
 """Whole lines of a text file as UTF-8, with what must be undone before columns.
 
-The text may be a file of a .zip or of a folder. Lines come many at a time, so that a log may be as
-long as it likes.
+The text may be a file of a .zip or of a folder. Lines come many at a time, so that a
+log may be as long as it likes.
 """
 
 from __future__ import annotations

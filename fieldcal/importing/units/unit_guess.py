@@ -272,7 +272,7 @@ class UnitGuess:
         unit beside times in another than was assumed.
         """
         decimals = bool((gyr != np.round(gyr)).any())
-        if self._times_are_said or (fits and (fits[0].lsb == 1 or not decimals)):
+        if self._times_are_said or (fits and (fits[0].lsb <= 1 or not decimals)):
             return []
         known = {} if decimals else {"scales": USUAL_COUNTS}
         usual = tick_options(reads, self.said.time_scale, **known)

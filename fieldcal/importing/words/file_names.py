@@ -13,7 +13,14 @@ from fieldcal.importing.words.heading_words import words_in_name
 
 _SENSORS = {
     "acc": ("acc", "accel", "accelerometer", "acceleration"),
-    "gyr": ("gyr", "gyro", "gyroscope", "rotationrate", "gyroscopes"),
+    "gyr": (
+        "gyr",
+        "gyro",
+        "gyroscope",
+        "rotationrate",
+        "gyroscopes",
+        "angularvelocity",
+    ),
 }
 _OTHERS = ("mag", "magnetometer", "linear", "lin", "gravity", "imu", "and", "angle",
            "orientation")  # fmt: skip
@@ -74,6 +81,8 @@ def sensor_of_file_name(stem: str) -> str:
 
     >>> [sensor_of_file_name(s) for s in ("TotalAcceleration", "gyro_exp01_user01")]
     ['acc', 'gyr']
+    >>> [sensor_of_file_name(s) for s in ("AngularVelocity", "angular_velocity")]
+    ['gyr', 'gyr']
     >>> [sensor_of_file_name(s) for s in ("rawaccdata", "33RPMgyr", "linacc")]
     ['acc', 'gyr', '']
     >>> stems = ("acc_and_gyro", "user_acceleration", "log")
@@ -81,6 +90,7 @@ def sensor_of_file_name(stem: str) -> str:
     ['', '', '']
     """
     words = words_in_name(stem)
+    words += ["".join(two) for two in zip(words, words[1:], strict=False)]
     before = dict(zip(words[1:], words, strict=False))
     letters = re.findall("[a-z]+", stem.lower())
     glued = {one[2] for word in letters if (one := _GLUED.fullmatch(word))}

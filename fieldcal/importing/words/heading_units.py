@@ -85,6 +85,8 @@ UNITS = {
     "t_host": (),
     "v": ("m/s^2", "g", "mg"),
     "l": (),
+    "dv_us": (),
+    "da_us": (),
     "": ("m/s^2", "g", "mg", *TELLING),
 }
 """Units that a kind of channel may have; of an axis alone, those that tell its kind."""

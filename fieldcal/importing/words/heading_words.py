@@ -59,7 +59,11 @@ _NO_RATE = ("angle", "roll", "pitch", "yaw", "heading", "euler", "theta", "phi")
 """Words of angles that are no rates."""
 
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host", "t_h": "t_h",
-          "t_min": "t_min"}  # fmt: skip
+          "t_min": "t_min", "delta_velocity_dt": "dv_us",
+          "delta_angle_dt": "da_us"}  # fmt: skip
+"""Names that are channels as they stand; the last are PX4's, us over which velocity and
+angle were gained."""
+
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated",
             "rate", *AXIS)  # fmt: skip
 """Words that tell no IMU from another where all of one kind have them."""
@@ -128,7 +132,7 @@ weak=False, gain=False, half=False)
     if force := _G_FORCE.fullmatch(name.strip()):
         return HeadingMeaning("a", force.group(1).lower(), "g")
     name = _BRACKETED_AXIS.sub(r" \1 ", name.strip().strip('"')).strip()
-    if (whole := _WHOLE.get(name.lower())) is not None:
+    if (whole := _WHOLE.get(name.lower().rpartition(".")[2])) is not None:
         return HeadingMeaning(whole, "", None)
     for bare, said in name_unit_splits(name, unit):
         found = _meaning_of_words([w.lower() for w in _WORD.findall(bare)], said)

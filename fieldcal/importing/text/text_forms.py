@@ -4,6 +4,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     "1,714,746"  1 714 746  1'714'746  thousands that are set apart
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
     Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
+    Data,4,accelerometer_data,…,"0|10" messages of a FIT file
     RAW_IMU {time_usec : 5, xacc : 3}  messages of MAVLink as mavlogdump shows them
     IMU:0.1,0.2,9.8,0,0,0              a word before the columns
     AcX,12,AcY,-45,AcZ,16384           values behind cells with their names
@@ -44,6 +45,7 @@ from fieldcal.importing.text.cell_forms import (
     SpacedCells,
 )
 from fieldcal.importing.text.dataflash_text import DataflashText
+from fieldcal.importing.text.fit_csv import FitCsv
 from fieldcal.importing.text.grouped_digits import GroupedDigits
 from fieldcal.importing.text.labelled_lines import LabelledValues
 from fieldcal.importing.text.labview_text import LabviewText
@@ -260,7 +262,7 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, MavlinkText, LabviewText, ScaledCounts, RateOnTop,
+    DataflashText, MavlinkText, FitCsv, LabviewText, ScaledCounts, RateOnTop,
     ReceiverLines, VectorNavLines, ZephyrLines, SaulLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
     QuotedCells, SpacedCells, PairedCells, FortranNumbers, UnitCells,

@@ -1,0 +1,91 @@
+"""Messages of a FIT file as text: samples of both sensors within cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from joined import read_files
+from laid_about import G, turned
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.text.fit_csv import HEADING, FitCsv
+
+RATE, EACH = 50.0, 20
+ROWS = turned(12, RATE, 2.0)
+ROWS = ROWS[: len(ROWS) // EACH * EACH]
+TOP = [f"{HEADING},Field 2,Value 2,Units 2",
+       "Definition,0,file_id,type,1,,time_created,1,,",
+       'Data,0,file_id,type,"4",,time_created,"1083000000",,']  # fmt: skip
+
+
+def cell(name: str, values: Sequence[object], unit: str) -> str:
+    return f'{name},"{"|".join(map(str, values))}",{unit}'
+
+
+def message(kind: str, t: Array, axes: Array, name: str, unit: str) -> str:
+    """One message, which holds the samples at times (n,)."""
+    since = 1_083_000_000 + t[0]
+    return ",".join([
+        "Data", "4", kind, cell("timestamp", [int(since)], "s"),
+        cell("timestamp_ms", [round(since % 1 * 1e3)], "ms"),
+        cell("sample_time_offset", np.round((t - t[0]) * 1e3).astype(int), "ms"),
+        *(cell(f"{name}_{a}", [f"{x:.7g}" for x in column], unit)
+          for a, column in zip("xyz", axes.T, strict=True)), "", "", "",
+    ])  # fmt: skip
+
+
+def log(with_rates: bool = True, late: float = 0.0) -> list[str]:
+    found = [*TOP]
+    for rows in np.split(ROWS, len(ROWS) // EACH):
+        found.append(message("accelerometer_data", rows[:, 0], rows[:, 1:4] / G,
+                             "calibrated_accel", "g"))  # fmt: skip
+        if with_rates:
+            found.append(message("gyroscope_data", rows[:, 0] + late,
+                                 np.rad2deg(rows[:, 4:]), "calibrated_gyro",
+                                 "deg/s"))  # fmt: skip
+    return found
+
+
+@pytest.mark.parametrize("late", [0.0, 0.004])
+def test_samples_of_both_sensors_go_together(tmp_path: Path, late: float) -> None:
+    path = tmp_path / "activity.csv"
+    path.write_text("\n".join(log(late=late)) + "\n")
+    block, _ = read_files([path])
+    np.testing.assert_allclose(np.diff(block.t), 1 / RATE, atol=2e-3)
+    np.testing.assert_allclose(block.acc, ROWS[:, 1:4], atol=1e-5)
+    np.testing.assert_allclose(block.gyr, ROWS[:, 4:], atol=1e-6)
+
+
+def test_an_accelerometer_may_be_alone(tmp_path: Path) -> None:
+    path = tmp_path / "activity.csv"
+    path.write_text("\n".join(log(with_rates=False)) + "\n")
+    block, _ = read_files([path])
+    np.testing.assert_allclose(block.acc, ROWS[:, 1:4], atol=1e-5)
+    assert np.isnan(block.gyr).all()
+
+
+def test_counts_are_taken_where_nothing_is_calibrated() -> None:
+    t = ROWS[:EACH, 0]
+    counts = 32768 + np.round(ROWS[:EACH, 1:4] * 400)
+    lines = [*TOP, message("accelerometer_data", t, counts, "accel", "counts")]
+    form = FitCsv.of(lines, None)
+    assert form is not None
+    assert form.names == ("time [s]", "accel_x", "accel_y", "accel_z")
+    first = form.reader()(lines)[0].split(",")
+    assert [float(x) for x in first[1:]] == counts[0].tolist()
+
+
+@given(st.lists(st.text(alphabet='Data,4_accelerometer_data"|0.x-', max_size=60)))
+def test_no_line_breaks_the_reader(lines: list[str]) -> None:
+    known = log()
+    form = FitCsv.of(known, None)
+    assert form is not None
+    read = form.reader()
+    assert len([*read([*lines, *known]), *read([])]) == len(ROWS)
+    cut = [line[:n] for line in known for n in (30, 90)]
+    assert len(form.reader()(cut)) == 0

@@ -5,6 +5,7 @@
     {"t": [0.01, ...], "ax": [0.1, ...], ...}
     {'t': 0.01, 'ax': 0.1}             [0.01, 0.1, 0.2, 9.8]      as Python prints them,
         also over several lines, with numbers of NumPy, or two objects in a line
+    2024-05-03 14:20:31.12,imu,"{""ax"": 0.1, ...}"      a record in a cell of a table
     {"data": [{"imu6": {"Timestamp": 10, "ArrayAcc": [{"x": ...}, ...]}}, ...]}
 
 What lies within is named with what it lies in, ``acc/x``. Records that hold the samples
@@ -28,6 +29,7 @@ from fieldcal.importing.records.cut_json import (
     whole_beginning,
     without_last_commas,
 )
+from fieldcal.importing.records.json_cells import cell_names, record_in_cells
 from fieldcal.importing.records.json_lists import json_lists
 from fieldcal.importing.records.python_text import (
     python_value,
@@ -73,6 +75,8 @@ def recognises(head: bytes, path: Path) -> bool:
 def _is_record(line: bytes) -> bool:
     """Whether a line is a record, also behind a time or a topic."""
     if RECORD.fullmatch(line) is not None:
+        return True
+    if record_in_cells(line.decode(errors="replace")) is not None:
         return True
     if BEFORE.fullmatch(line.decode(errors="replace").strip()) is None:
         return False
@@ -132,14 +136,19 @@ class JsonLog(ArrayFile):
                 self.damaged("its end", CUT_OFF)
                 return document
         found = []
+        names: list[str] = []
         for number, line in enumerate(text.splitlines(), 1):
             if not line.strip():
+                continue
+            if (row := record_in_cells(line, names)) is not None:
+                found.append(row)
                 continue
             try:
                 found.append(_parse_line(line))
             except (ValueError, RecursionError) as error:
                 if not found and not BEGINS.match(line.encode()):
-                    # what a device says while it starts
+                    # what a device says while it starts, or names of cells
+                    names = cell_names(line)
                     continue
                 self.damaged(f"line {number}", f"is no JSON: {error}"[:80])
         return found
@@ -163,9 +172,12 @@ def _said_before(text: str) -> Iterator[tuple[str, Any]]:
 
     >>> dict(_said_before("[1714746031.25][1250][imu]"))
     {'time': 1714746031.25, 'topic': 'imu'}
+    >>> dict(_said_before("1250,")), dict(_said_before("lab/imu/1"))
+    ({'time': 1250.0}, {'topic': 'lab/imu/1'})
     """
-    if is_clock(clock := text.strip(" []")):
-        yield CLOCK, clock
+    clock = text.strip(" []:,;|")
+    if is_clock(clock) or NUMBER.fullmatch(clock):
+        yield CLOCK, clock if is_clock(clock) else float(clock)
         return
     if "[" not in text:
         yield "topic", text

@@ -6,6 +6,7 @@
 05-03 14:20:31.123  1234  1250 D Imu: ax=0.1             Android's logcat
 [   123] ax=0.1
 [12.345] imu: ax=0.1        1700000000.123 [INFO] ax=0.1        12345 ms | ax=0.1
+12345, ax=0.1               12345: ax=0.1                       (12345) ax=0.1
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ STAMP = "time [s]"
 COUNT = "time"
 """Name of a number in brackets: ticks, or rows."""
 
+_TO_LABELS = r"[\s:|,;>-]+(?=[A-Za-z({\[][^:=]*[:=])"
+"""What stands between a bare number and labels behind it."""
+
 _FORMS = {
     STAMP: (
         r"\s*\[\s*(?:DEBUG|INFO|WARN(?:ING)?|ERROR|FATAL)\s*\]\s*\[(\d+\.\d+)\]()"
@@ -41,7 +45,11 @@ _FORMS = {
         r"\s*\[(\d{8,})\]()\s*<\w+>\s*[\w.-]+:\s*",
         r"\s*(\d+)() ?ms\b[\s:|,-]+(?=[A-Za-z])",
     ),
-    COUNT: (r"\s*\[\s*(\d+)\]():?\s*(?=[A-Za-z])",),
+    COUNT: (
+        r"\s*\[\s*(\d+)\]():?\s*(?=[A-Za-z])",
+        rf"\s*(\d+(?:\.\d+)?)(){_TO_LABELS}",
+        rf"\s*\((\d+(?:\.\d+)?)()\){_TO_LABELS}",
+    ),
 }
 """Forms by the name of the time in them, which is in two parts."""
 

@@ -15,6 +15,7 @@ from laid_about import turned
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Column
+from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.tables.own_times import own_times
 
 SLOW, FAST = (turned(9, rate, 2.0) for rate in (50.0, 74.0))
@@ -53,6 +54,18 @@ def test_each_sample_goes_with_the_nearest_in_time(
     near = np.abs(late[:, :1] - force[:, 0]).argmin(axis=0)
     close = np.abs(late[near, 0] - force[:, 0]) < 0.5 * force[1, 0]
     np.testing.assert_allclose(block.gyr[close], late[near[close], 1:], rtol=1e-6)
+    assert any("times of their own" in one for one in says)
+
+
+def test_columns_that_are_said_mean_what_the_names_do(tmp_path: Path) -> None:
+    """As the import says them itself, to be given again."""
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([NAMES, *beside(SLOW[:, :4], FAST[:, [0, 4, 5, 6]])]))
+    bare, _ = read_files([path])
+    said, says = read_files(
+        [path], ReadOptions(columns=("t", "ax", "ay", "az", "_", "gx", "gy", "gz"))
+    )
+    np.testing.assert_array_equal(said.gyr, bare.gyr)
     assert any("times of their own" in one for one in says)
 
 

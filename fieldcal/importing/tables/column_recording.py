@@ -238,9 +238,12 @@ class ColumnRecording(Recording):
     def _with_units_of_names(self) -> ReadOptions:
         """What the user says, with the units that stand over the columns so named."""
         wanted, at = self.wanted, column_numbers(self, self.wanted)
-        width = self.beginning().shape[1]
+        table = self.beginning()
         for way in self.heading():
-            if len(way.columns) == width:
+            if len(way.columns) == table.shape[1]:
+                apart = own_times(way.columns, at, table)
+                if apart is not None and apart.force == at["t"]:
+                    self._own_times = apart
                 with_them = self._with_units_over(wanted, way, at)
                 if with_them != wanted:
                     return with_them

@@ -68,7 +68,9 @@ def own_times(
     said = {i: heading_meaning(c.name, c.unit) for i, c in enumerate(columns)}
     times = {i: one for i, one in said.items() if one is not None and one.kind == "t"}
     of_words = {i: _sensor(one.label) for i, one in times.items()}
-    before = {k: min(at[k + axis] for axis in "xyz") - 1 for k in "ag"}
+    before = {
+        k: min(at[c] for c in (k + x for x in "xyz") if c in at) - 1 for k in "ag"
+    }
     found = []
     for kind in "ag":
         named = [i for i, sensor in of_words.items() if sensor == kind]

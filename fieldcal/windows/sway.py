@@ -128,6 +128,8 @@ def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
     y = six[: count * each].reshape(count, each, -1).mean(axis=1)
     own = t[: count * each].reshape(count, each)
     whole = np.ptp(own, axis=1) < (each + 0.5) * step  # none across a gap
+    if np.count_nonzero(whole) < FEWEST_CELLS:  # as of samples that come in bursts
+        return None
     return own.mean(axis=1)[whole], y[whole], each * step
 
 

@@ -284,3 +284,11 @@ def test_of_large_swaying_nothing_is_left_but_noise() -> None:
     left = six - found.outputs(t)
     np.testing.assert_allclose(left.std(axis=0), NOISE, rtol=0.1)
     assert (np.abs(left.mean(axis=0) - REST) < NOISE / 10).all()
+
+
+def test_samples_in_pairs_fill_no_cell_of_their_usual_distance() -> None:
+    """Most follow the one before after a tenth of the mean distance."""
+    rng = np.random.default_rng(4)
+    t, six = swayed(rng, (1.0,))
+    late = np.arange(len(t)) % 3
+    assert find_sway(t - 0.9 / RATE * late, six) == []

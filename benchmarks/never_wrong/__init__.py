@@ -112,8 +112,12 @@ GROUPED = {
     "gravity's direction alone; a device that calibrates itself; a falling supply": (
         "gravity's direction alone", "calibrates itself", "supply falls",
     ),
+    "corrected in steps, biases that shift at times, axes of the screen": (
+        "corrected in steps", "biases shifted at times", "axes of the screen",
+    ),
     "two days, two devices or two mountings in one": (
         "two days joined", "device exchanged", "device remounted",
+        "a second device heard",
     ),
     "high-passed, zeroed at stops, a dead band, sent on change, clipped in turns": (
         "acc high-passed", "gyr zeroed at each stop", "dead band", "sent on change",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from benchmarks._own_axes import own_axes
 from benchmarks.never_wrong.acting import Acting
+from benchmarks.never_wrong.beside import Beside
 from benchmarks.never_wrong.device import Device
 
 Floats = NDArray[np.float64]
@@ -74,6 +75,7 @@ class Bench:
     skew : rad by which the axes of the two joints are not square
     creep, creeps_s : rad by which a joint goes too far in a turn, and T, s, of its way
         back
+    beside : a second device that is heard in the same stream, if there is one
 
     """
 
@@ -104,6 +106,7 @@ class Bench:
     skew: float = 0.0
     creep: float = 0.0
     creeps_s: float = 1.0
+    beside: Beside | None = None
 
     @property
     def angles(self) -> Floats:

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.never_wrong.bench import Bench, wrongly_set
+from benchmarks.never_wrong.beside import Beside
 from benchmarks.never_wrong.device import Device
 from benchmarks.never_wrong.fixture_mistakes import OF_FIXTURE
 from benchmarks.never_wrong.written import Before, Rng, acting, log_uniform
@@ -164,6 +165,31 @@ def read_coarsely(bench: Bench, rng: Rng) -> Bench:
     return wrongly_set(bench, rng.uniform(-step / 2, step / 2, bench.off.shape))
 
 
+def second_heard(bench: Bench, rng: Rng) -> Bench:
+    """A second device of the make sends into the same stream, under the same names.
+
+    Its biases are other ones by 0.1 to 10 mg and 2 to 500 deg/h, and it is mounted 0.05
+    to 1 degrees otherwise. For each of its samples there are one to eight of the first.
+    """
+    acc, gyr = log_uniform(rng, 1e-3, 0.1), log_uniform(rng, 1e-5, 2.4e-3)
+    scale, axis = log_uniform(rng, 1e-4, 3e-3), rng.normal(size=3)
+    size = np.deg2rad(log_uniform(rng, 0.05, 1.0)) / np.linalg.norm(axis)
+    x, y, z = (size * axis).tolist()
+    beside = Beside(
+        acc_bias=bench.acc_bias + rng.normal(0, acc, 3),
+        acc_scale=bench.acc_scale + rng.normal(0, scale, 3),
+        gyr_bias=bench.gyr_bias + rng.normal(0, gyr, 3),
+        gyr_scale=bench.gyr_scale + rng.normal(0, scale, 3),
+        device=Device.drawn(rng),
+        turned=(x, y, z),
+        every=int(rng.choice([1, 1, 1, 2, 4, 8])),
+        late=float(rng.uniform(0.05, 0.95)),
+        exchanged=float(rng.choice([0.0, 0.0, rng.uniform(0.0, 0.3)])),
+        counted=bool(rng.integers(2)),
+    )
+    return replace(bench, beside=beside)
+
+
 def sinking(bench: Bench, rng: Rng) -> Bench:
     """Soft ground gives way by 0.02 to 0.5 degrees, in 50 to 500 s."""
     size = float(np.deg2rad(log_uniform(rng, 0.02, 0.5))) * float(rng.choice([-1, 1]))
@@ -191,6 +217,7 @@ BEFORE: dict[str, Before] = OF_FIXTURE | {
     "slips in its mount": slipping,
     "fastened askew": crooked,
     "angles read coarsely": read_coarsely,
+    "a second device heard": second_heard,
 }
 
 

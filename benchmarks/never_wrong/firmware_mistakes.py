@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from benchmarks.never_wrong.bench import Bench, Samples
+from benchmarks.never_wrong.device import LAG
 from benchmarks.never_wrong.written import After, Rng, Written, log_uniform
 
 STANDARD = 9.80665
@@ -55,8 +56,61 @@ def supply_falls(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, acc=acc))
 
 
+def corrected_in_steps(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The device takes what its temperature does to biases from a table, in steps.
+
+    As it warms up, biases drift by 1 to 5 grains, and jump back at 1 to 4 temperatures.
+    """
+    s, grain = written.samples, bench.grain or 1e-3
+    warm = 1 - np.exp(-s.t / LAG)
+    some, end = int(rng.integers(1, 5)), float(1 - np.exp(-bench.windows[-1, 1] / LAG))
+    step = end / some
+    left = warm / step - np.floor(warm / step + rng.uniform())
+    left -= np.interp(bench.windows[-1, 1], s.t, left)
+    changed = []
+    for out, of in ((s.acc, grain), (s.gyr, log_uniform(rng, 1e-5, 2e-4))):
+        jumps = of * rng.integers(1, 6, 3) * rng.choice([-1, 1], 3)
+        changed.append(out + left[:, None] * jumps)
+    acc, gyr = changed
+    if bench.grain:
+        acc = np.round(acc / bench.grain) * bench.grain
+    return replace(written, samples=Samples(s.t, acc, gyr))
+
+
+def shifted_at_times(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Biases shift by themselves at 2 to 4 instants, by 3 to 30 errors of a mean."""
+    s, size = written.samples, log_uniform(rng, 3.0, 30.0)
+    error = size / np.sqrt(bench.hold * bench.rate)
+    acc, gyr = s.acc.copy(), s.gyr.copy()
+    first, last = bench.windows[0, 0], bench.windows[-1, 0]
+    for at in rng.uniform(first, last, int(rng.integers(2, 5))):
+        acc[s.t < at] += rng.normal(0, error * bench.acc_noise, 3)
+        gyr[s.t < at] += rng.normal(0, error * bench.gyr_noise, 3)
+    if bench.grain:
+        acc = np.round(acc / bench.grain) * bench.grain
+    return replace(written, samples=Samples(s.t, acc, gyr))
+
+
+def axes_of_screen(written: Written, bench: Bench, rng: Rng) -> Written:
+    """A phone names its axes by its screen, which turned on the way between two.
+
+    In half of the positions at most, the first ones, the axes are those of a screen
+    that is a quarter of a turn about z from that of the others, to either side.
+    """
+    s, way = written.samples, int(rng.integers(1, len(bench.windows) // 2 + 1))
+    at = rng.uniform(bench.windows[way - 1, 1], bench.windows[way, 0])
+    side = float(rng.choice([-1, 1]))
+    before = (s.t < at)[:, None]
+    quarter = np.array([[0.0, -side, 0.0], [side, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    acc, gyr = (np.where(before, out @ quarter, out) for out in (s.acc, s.gyr))
+    return replace(written, samples=Samples(s.t, acc, gyr))
+
+
 OF_FIRMWARE: dict[str, After] = {
     "gravity's direction alone": gravity_direction,
     "calibrates itself": calibrates_itself,
     "supply falls": supply_falls,
+    "corrected in steps": corrected_in_steps,
+    "biases shifted at times": shifted_at_times,
+    "axes of the screen": axes_of_screen,
 }

@@ -13,9 +13,12 @@ of joints that are not square are turned by s about y from each other:
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from benchmarks.never_wrong.bench import EARTH, Bench, Floats, Samples
+from benchmarks.never_wrong.beside import merged
 
 
 def turned(alpha: Floats, beta: Floats, vector: Floats, skew: float = 0.0) -> Floats:
@@ -46,7 +49,22 @@ def to_device(mounting: tuple[str, str, str], values: Floats) -> Floats:
 
 
 def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
-    """What the device puts out."""
+    """What the device puts out, and what one beside it puts between."""
+    heading = rng.uniform(0, 2 * np.pi)
+    s = _put_out(bench, heading, rng)
+    if (beside := bench.beside) is None:
+        return s
+    acting = replace(bench.acting, slips=beside.turned, slip_s=-10.0)
+    second = replace(
+        bench, acting=acting, acc_bias=beside.acc_bias, acc_scale=beside.acc_scale,
+        gyr_bias=beside.gyr_bias, gyr_scale=beside.gyr_scale, device=beside.device,
+    )  # fmt: skip
+    o = _put_out(second, heading, rng)
+    return Samples(*merged((s.t, s.acc, s.gyr), (o.t, o.acc, o.gyr), beside, rng))
+
+
+def _put_out(bench: Bench, heading: float, rng: np.random.Generator) -> Samples:
+    """What one device puts out where the fixture's x points `heading` rad off east."""
     windows = bench.windows
     t = np.arange(0.0, windows[-1, 1] + 2.0, 1 / bench.rate)
     joints, speed = _joints(bench, t)
@@ -56,7 +74,7 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
     sway, swing = bench.acting.tilted(t)
     down = np.column_stack([np.zeros_like(t), np.cos(sway), np.sin(sway)])
     f = turned(alpha, beta, _on_base(bench, -bench.gravity * down), bench.skew)
-    latitude, heading = np.deg2rad(bench.latitude), rng.uniform(0, 2 * np.pi)
+    latitude = np.deg2rad(bench.latitude)
     north = EARTH * np.cos(latitude)
     rates = np.tile([north * np.sin(heading), -EARTH * np.sin(latitude),
                      north * np.cos(heading)], (len(t), 1))  # fmt: skip

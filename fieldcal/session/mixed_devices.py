@@ -25,6 +25,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.once import once_per_block
 from fieldcal.core.rotation import nearest_rotation
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Block
+from fieldcal.session.interleaved_devices import find_interleaved_devices
 from fieldcal.windows.alternation import (
     CLEAR,
     FEWEST_SAMPLES,
@@ -63,13 +64,20 @@ GIVE_EACH_A_PORT = (
 """What to do about two devices on one port."""
 
 
-def difference_text(means: TwoMeans) -> str:
-    """The clearest difference of each sensor, such as ``ax by 0.49 m/s²``."""
-    parts, clear = [], np.abs(means.apart) / means.noise
+def difference_text(apart: Array, noise: Array) -> str:
+    """The clearest difference of each sensor, such as ``ax by 0.49 m/s²``.
+
+    Parameters
+    ----------
+    apart : differences (6,) m/s^2 and rad/s
+    noise : what each is to be clear of
+
+    """
+    parts, clear = [], np.abs(apart) / noise
     for first, unit in ((0, "m/s²"), (3, "rad/s")):
         at = first + int(clear[first : first + 3].argmax())
         if clear[at] > CLEAR:
-            parts.append(f"{CHANNELS[at]} by {abs(means.apart[at]):.2g} {unit}")
+            parts.append(f"{CHANNELS[at]} by {abs(apart[at]):.2g} {unit}")
     return " and ".join(parts)
 
 
@@ -86,7 +94,7 @@ def mixed_samples_text(six: Array) -> str:
         return ""
     return (
         "two devices seem to send on one port: the samples change to and fro in"
-        f" {difference_text(means)}"
+        f" {difference_text(means.apart, means.noise)}"
     )
 
 
@@ -138,13 +146,16 @@ def refuse_mixed_devices(
         Saying by how much they differ.
 
     """
-    means = find_mixed_devices(block, windows)
-    if means is not None:
-        raise InputError(
-            "the samples of two devices come by turns, under the same names, and differ"
-            f" in one window in {difference_text(means)}: their mean is that of"
-            f" neither; {GIVE_EACH_A_PORT}"
-        )
+    if (means := find_mixed_devices(block, windows)) is not None:
+        differ = difference_text(means.apart, means.noise)
+    elif (found := find_interleaved_devices(block, windows)) is not None:
+        differ = difference_text(found.size, found.error)
+    else:
+        return
+    raise InputError(
+        "the samples of two devices come by turns, under the same names, and differ in"
+        f" one window in {differ}: their mean is that of neither; {GIVE_EACH_A_PORT}"
+    )
 
 
 def _ends(six: Array) -> tuple[Array, Array]:

@@ -267,3 +267,85 @@ def test_a_device_askew_feels_the_same_force_in_other_axes() -> None:
 def test_angles_that_are_read_coarsely_are_off_by_half_a_step_at_most() -> None:
     bench = spoilt(_ideal("wide"), ("angles read coarsely",), np.random.default_rng(3))
     assert 0 < np.abs(np.rad2deg(bench.off)).max() <= 0.5
+
+
+def test_a_second_device_sends_every_so_often_and_feels_the_same() -> None:
+    """Without errors of their own, two at an angle differ by how they are turned."""
+    bench = replace(_ideal("wide"), acc_noise=1e-9)
+    plain = _samples(bench)
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        heard = spoilt(bench, ("a second device heard",), rng)
+        beside = heard.beside
+        assert beside is not None
+        ideal = replace(
+            beside, device=IDEAL, acc_bias=NONE, acc_scale=np.ones(3), exchanged=0.0
+        )
+        s = _samples(replace(heard, beside=ideal))
+        assert len(s.t) == pytest.approx(len(plain.t) * (1 + 1 / beside.every), abs=1)
+        assert np.diff(s.t).min() > 0 or beside.every > 1
+        other = ~np.isin(s.acc[:, 0], plain.acc[:, 0])
+        place = np.flatnonzero(other)
+        assert (np.diff(place) == beside.every + 1).all()
+        start, end = bench.windows[1]
+        here = s.within(start, end)
+        first, second = (s.acc[here & of].mean(axis=0) for of in (~other, other))
+        assert np.linalg.norm(second) == pytest.approx(np.linalg.norm(first), rel=1e-6)
+        turn = Rotation.from_rotvec(beside.turned)
+        assert 0.04 < np.rad2deg(turn.magnitude()) < 1.01
+        assert second == pytest.approx(turn.inv().apply(first), abs=1e-6)
+
+
+def test_a_second_device_is_heard_in_the_wrong_order_at_times() -> None:
+    bench = _ideal("five", acc_bias=NONE + 1.0)
+    beside = spoilt(bench, ("a second device heard",), np.random.default_rng(0)).beside
+    assert beside is not None
+    beside = replace(beside, acc_bias=NONE + 5.0, every=1, exchanged=0.2)
+    s = _samples(replace(bench, beside=beside))
+    second = (s.acc.sum(axis=1) > 0)[s.within(0.0, 30.0)]  # in the first position
+    twice = np.count_nonzero(second[1:] & second[:-1]) / len(second)
+    assert twice == pytest.approx(0.2 * 0.8 / 2, rel=0.25)
+
+
+def test_a_table_in_steps_leaves_a_saw_that_ends_at_the_bias() -> None:
+    bench = _ideal("five")
+    jumps = []
+    for seed in range(6):
+        plain = recorded(bench, np.random.default_rng(seed))
+        s = _made("corrected in steps", bench, seed).samples
+        for seen, honest in ((s.acc, plain.acc), (s.gyr, plain.gyr)):
+            more = seen - honest
+            end = np.searchsorted(s.t, bench.windows[-1, 1])
+            assert more[end] == pytest.approx(NONE, abs=1e-6)
+            steps = np.diff(more, axis=0)
+            large = np.abs(steps) > 20 * np.median(np.abs(steps), axis=0)
+            assert 1 <= np.count_nonzero(large[:, 0]) <= 5
+            assert (np.ptp(more, axis=0) < 1.01 * np.abs(steps).max(axis=0)).all()
+        jumps.append(np.abs(np.diff(s.acc - plain.acc, axis=0)).max(axis=0) / 1e-3)
+    assert np.array(jumps) == pytest.approx(np.round(jumps), abs=0.02)
+
+
+def test_biases_that_shift_at_times_are_at_last_what_they_were_drawn() -> None:
+    bench = replace(_ideal("five"), acc_noise=1e-3, gyr_noise=1e-4)
+    plain = recorded(bench, np.random.default_rng(1))
+    error = np.array([1e-3, 1e-4]) / np.sqrt(bench.hold * bench.rate)
+    for seed in (1, 1):
+        s = _made("biases shifted at times", bench, seed).samples
+        more = (s.acc - plain.acc, s.gyr - plain.gyr)
+        for seen, unit in zip(more, error, strict=True):
+            steps = np.diff(seen, axis=0)
+            there = np.abs(steps).max(axis=1) > 1e-9
+            assert 2 <= np.count_nonzero(there) <= 4
+            assert 0.5 < np.std(steps[there]) / unit < 60
+            assert seen[s.within(*bench.windows[-1])] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_axes_of_a_screen_are_those_of_the_device_in_the_last_positions() -> None:
+    bench = _ideal("six_faces")
+    honest = _means(bench, _samples(bench))
+    for seed in range(4):
+        means = _means(bench, _made("axes of the screen", bench, seed).samples)
+        other = np.abs(means - honest).max(axis=1) > 1e-9
+        assert not other[3:].any()
+        assert means[:, 2] == pytest.approx(honest[:, 2])
+        assert abs(means[0] @ honest[0]) < 1e-9  # g along y becomes g along x

@@ -1,0 +1,129 @@
+"""One sample in every k that differs from the others by as much throughout a window.
+
+Less the moving mean over a period of k samples, y(i), which takes out what changes
+slowly, a window is cut into pieces of whole periods. With the mean of y in each of the
+k places of a period, over piece p,
+
+    c_p(s) = k/(k - 1) mean of y in place s,    t(s) = mean c_p(s) / error       (1)
+
+is by how much the samples in place s differ from the others, and its error follows from
+how c_p scatters between pieces. That holds for noise of any spectrum, so a sensor that
+is sampled twice, filtered or held, and a vibration whose phase runs on, show nothing.
+Two devices do that send by turns, one of them k - 1 times as often: also where they
+differ by much less than the noise of a sample, and where a part of the samples arrives
+in the wrong order.
+
+A steady line of 1/k of the rate gives c(s) a course through all places, in which the
+largest explains less than `LEAST_OF_ONE_PLACE` from k = 4 on.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+
+PERIODS = range(2, 11)
+"""Periods that are tried, in samples: rates of two devices differ tenfold at most."""
+
+PARTS, PIECES_OF_A_PART = 4, 6
+"""Parts of a window that are compared, and pieces by whose scatter each is known."""
+
+PIECES = PARTS * PIECES_OF_A_PART
+
+MOST_SAMPLES = 50_000
+"""Samples of a window that are looked at."""
+
+LEAST_ERROR = 1e-15
+"""Of an output that is zero throughout, m/s^2 or rad/s."""
+
+LEAST_OF_ONE_PLACE = 0.75
+"""Share of the squares in all places that the largest explains, of one in k samples. A
+line of 1/k gives 0.67 or less; so does any course without one such place."""
+
+STEADY_F = 15.0
+"""Ratio of the variance between parts to that inside them, from which a difference is
+not steady. With 3 and 20 degrees of freedom, noise exceeds it once in 50 000 times."""
+
+MOST_T = 1e3
+"""Largest difference in units of its error, which rounding may make zero."""
+
+
+class OnePlace(NamedTuple):
+    """What samples in one place of a period differ by from all others.
+
+    Attributes
+    ----------
+    size : (6,) m/s^2 and rad/s; 0 in outputs that have no values
+    error : standard error of each, (6,); infinite in those
+    steady : whether it is the same throughout the window
+
+    """
+
+    size: Array
+    error: Array
+    steady: bool
+
+    @property
+    def t(self) -> Array:
+        """Sizes in units of their errors, (6,)."""
+        return np.asarray(np.clip(self.size / self.error, -MOST_T, MOST_T))
+
+
+def one_place_of_period(six: Array, period: int) -> OnePlace | None:
+    """The place of a period that differs most; None for too few samples.
+
+    Parameters
+    ----------
+    six : consecutive samples at rest, (n, 6) m/s^2 and rad/s; nan where there is none
+    period : k, samples
+
+    """
+    live = np.flatnonzero(2 * np.isfinite(six).sum(axis=0) > len(six))
+    x = six[:MOST_SAMPLES, live]
+    x = x[np.isfinite(x).all(axis=1)]
+    each = (len(x) - period) // (period * PIECES)
+    if each < 1 or not len(live):
+        return None
+    y = _less_moving_mean(x, period)[: each * period * PIECES]
+    places = y.reshape(PIECES, each, period, -1).mean(axis=1)
+    places *= period / (period - 1)  # (1)
+    mean, error = places.mean(axis=0), places.std(axis=0, ddof=1) / np.sqrt(PIECES)
+    least = np.maximum(np.finfo(float).eps * np.abs(x).max(axis=0), LEAST_ERROR)
+    # in units of one error for all: where the order varies, places have their own
+    square = mean**2 / np.maximum((error**2).mean(axis=0), least**2)
+    square = square.sum(axis=1)
+    place = int(square.argmax())
+    steady = _is_steady(places[:, place], least)
+    found = OnePlace(np.zeros(6), np.full(6, np.inf), steady)
+    if period > 2 and not _is_of_one_place(square - len(live)):
+        return found  # a line has as much in other places
+    found.size[live] = mean[place]
+    found.error[live] = np.maximum(error[place], least)
+    return found
+
+
+def _less_moving_mean(x: Array, period: int) -> Array:
+    """Samples less the mean over a period about each, (n - period, outputs)."""
+    sums = np.vstack([np.zeros(x.shape[1]), np.cumsum(x - x.mean(axis=0), axis=0)])
+    means = (sums[period:] - sums[:-period]) / period
+    if period % 2:
+        return np.asarray((x - x.mean(axis=0))[period // 2 :][: len(means)] - means)
+    middle = (means[1:] + means[:-1]) / 2
+    return np.asarray((x - x.mean(axis=0))[period // 2 :][: len(middle)] - middle)
+
+
+def _is_of_one_place(square: Array) -> bool:
+    """Whether one of the places explains the squares (k,) beyond those of noise."""
+    period = len(square)
+    return bool(square.max() / (1 - 1 / period) >= LEAST_OF_ONE_PLACE * square.sum())
+
+
+def _is_steady(pieces: Array, least: Array) -> bool:
+    """Whether differences (`PIECES`, outputs) are the same in all parts of a window."""
+    parts = pieces.reshape(PARTS, PIECES_OF_A_PART, -1)
+    inside = np.maximum(parts.var(axis=1, ddof=1).mean(axis=0), least**2)
+    between = PIECES_OF_A_PART * parts.mean(axis=1).var(axis=0, ddof=1)
+    return bool((between <= STEADY_F * inside).all())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -254,3 +255,32 @@ def test_no_size_gains_more_than_each_direction_at_a_size_of_its_own(seed: int) 
         best = gains_from_eigenvalues(s, p, fine).max(axis=1)
         assert (best <= bound + 1e-9).all()
     np.testing.assert_allclose(best[5:], bound[5:], rtol=1e-4, atol=1e-5)
+
+
+@SEEDS
+def test_means_that_are_known_far_better_than_rotations_keep_what_they_tell(
+    seed: int,
+) -> None:
+    """Rows across the rotations are as well known as without, along them no better.
+
+    Means of smoothed samples have had errors of 1e-12 m/s^2, and no covariance then.
+    """
+    one, rng = case(seed, (0,)).gram, np.random.default_rng(seed)
+    info = np.where(one.info > 0, 1e24, 0.0)
+    turned = np.where(info[..., None] > 0, rng.normal(size=(*info.shape, 2)), 0.0)
+    exact = replace(
+        one, info=info, shared=0 * info, closure_errors=0 * one.closure_errors,
+        free_rotations=turned,
+    )  # fmt: skip
+    root, log_det = exact.whitening(np.zeros(7))
+    expected = 0.0
+    for p, own in enumerate(turned):
+        there = np.flatnonzero(info[p])
+        basis, size, _ = np.linalg.svd(own[there])
+        white = root[p][:, there] @ basis
+        wide = np.append(size, np.zeros(len(there)))[: len(there)]
+        spread = np.hypot(wide, 1e-12)  # of each direction
+        known = np.linalg.norm(white, axis=0) * spread
+        np.testing.assert_allclose(known, 1.0, rtol=0.02)
+        expected += 2 * np.log(spread / 1e-12).sum()
+    assert log_det == pytest.approx(expected, rel=1e-9)

@@ -35,6 +35,7 @@ from fieldcal.session.folder import Session
 from fieldcal.session.mixed_devices import refuse_mixed_devices
 from fieldcal.windows import Average, LearnedNoise
 from fieldcal.windows.dead_axis import DeadSensor, dead_sensors, without_dead_axes
+from fieldcal.windows.noise import converter_noise
 
 RANGE_TOLERANCE = 1e-6
 """Tolerance of a full scale for rounding and conversion of units, as a share of it."""
@@ -137,6 +138,7 @@ def _average_windows(
         block = sways.block
         warnings.append(sways.sentence)
     taken: dict[int, Average] = {}
+    least = converter_noise(block.six)
     noise: LearnedNoise | None = None
     held = about.in_time_order()
     # each window provides the noise for the next
@@ -153,7 +155,7 @@ def _average_windows(
         if sways is not None:
             by_sway = np.diag(sways.excess_variance[i])
             found = replace(found, covariance=found.covariance + by_sway)
-        taken[i] = found
+        taken[i] = found.no_better_than(least)
         if remark:
             warnings.append(f"{_position_label(session, i)}: {remark}")
     for i, missing in _incomplete(taken, about).items():

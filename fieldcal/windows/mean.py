@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,3 +34,13 @@ class Average:
     def sigma(self) -> Array:
         """Standard error of each mean, (6,)."""
         return np.sqrt(np.diag(self.covariance))
+
+    def no_better_than(self, noise: Array) -> Average:
+        """The same with errors of at least those of samples with some noise, (6,).
+
+        Where there is no error at all, one value is repeated, and nothing known of it.
+        """
+        sigma = self.sigma
+        least = np.where(sigma > 0, noise / np.sqrt(self.n), 0.0)
+        wider = np.fmax(1.0, least / np.where(sigma > 0, sigma, 1.0))
+        return replace(self, covariance=self.covariance * np.outer(wider, wider))

@@ -23,7 +23,8 @@ almost nothing of motion slower than a tenth of the sample rate,
 
     s^2 = <(x_{k+2} - 4 x_{k+1} + 6 x_k - 4 x_{k-1} + x_{k-2})^2> / 70            (3)
 
-No level is below what the steps of the outputs allow (`rounding`). Source: IEEE Std
+No level is below what the steps of the outputs allow (`rounding`), nor, for what is
+calculated from it, below what converters leave (`converter_noise`). Source: IEEE Std
 952, annex C; J. von Neumann 1941 for (2).
 """
 
@@ -52,6 +53,10 @@ STEP_SAMPLES = 2000
 RISES, FALLS = 2.0, 2.0
 """Least ratios of the maximum of s^2(m) to its first and its last value for a motion to
 and fro."""
+
+EFFECTIVE_BITS = 23.5
+"""Full scale in units of the noise, as a power of 2, of a converter of 24 bits made for
+slow signals, at 10 to 80 samples a second (TI, SBAS350G, ADS1232 and ADS1234)."""
 
 AGREE = 3.0
 ANCHOR_S = 1.0
@@ -94,6 +99,25 @@ def measure_noise(pieces: Sequence[Array], rate_hz: float) -> ChannelNoise:
     least = rounding.least_deviation(smallest_steps(pieces))
     quick = np.maximum(np.sqrt(levels[:, -1]), least)
     return ChannelNoise(np.maximum(white, least), quick)
+
+
+def converter_noise(six: Array) -> Array:
+    """Least standard deviation of one sample, (6,), that a converter leaves.
+
+    A triad's full scale, which is twice its largest values at least, over 2 to the
+    power of `EFFECTIVE_BITS`; 0 where nothing was measured. Samples have less if they
+    are computed: by a simulation, or as means of others.
+
+    Parameters
+    ----------
+    six : samples of a recording, turns included, (n, 6) m/s^2 and rad/s
+
+    """
+    some = six[:: max(1, len(six) // MOST_DIFFERENCES)]
+    values = (np.abs(triad[np.isfinite(triad)]) for triad in np.hsplit(some, 2))
+    # not the very largest, which may be wrong bits
+    most = [np.quantile(own, 0.99) if len(own) else 0.0 for own in values]
+    return np.repeat(2 * np.array(most) / 2**EFFECTIVE_BITS, 3)
 
 
 def is_to_and_fro(pieces: Sequence[Array]) -> bool:

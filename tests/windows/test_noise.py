@@ -327,3 +327,19 @@ def test_a_walk_shows_between_the_two_longest_means() -> None:
         assert abs(levels[0] - levels[2]) > 3 * np.hypot(0.02, 0.02) * levels[0]
         found = noise._white_under_walk(lengths, levels, spreads)
         assert found == (pytest.approx(2.0) if walks else None)
+
+
+def test_a_converter_leaves_a_part_of_what_the_triad_measures() -> None:
+    """Each triad has its own full scale; wrong words and missing values are none."""
+    rng = np.random.default_rng(8)
+    six = rng.uniform(-1, 1, (5000, 6)) * [9.8, 0.1, 0.1, 0.0, 0.02, 0.5]
+    plain = noise.converter_noise(six)
+    scale = 2 * 2**-23.5
+    assert plain[:3] == pytest.approx(scale * np.quantile(np.abs(six[:, :3]), 0.99))
+    assert plain[3:] == pytest.approx(scale * np.quantile(np.abs(six[:, 3:]), 0.99))
+    assert 1e-6 < plain[0] < 2e-6
+    six[::1000, 1] = 1e30
+    six[5, 0] = np.nan
+    assert noise.converter_noise(six) == pytest.approx(plain, rel=0.05)
+    six[:, 3:] = np.nan
+    assert (noise.converter_noise(six)[3:] == 0).all()

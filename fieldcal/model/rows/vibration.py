@@ -16,7 +16,11 @@ import numpy as np
 from fieldcal.core.once import once_per_block
 from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model.rows.noise import noise_of, rounding_noise
-from fieldcal.windows.noise import ChannelNoise, short_lag_noise
+from fieldcal.windows.noise import (
+    ChannelNoise,
+    converter_noise,
+    short_lag_noise,
+)
 
 NOISIER_SIGNIFICANCE = 6.0
 """Significance from which a window counts as noisier than the others."""
@@ -119,6 +123,9 @@ def _compare_windows(
     white, quick = (
         np.where(finest > 0, np.fmax(n, finest), n) for n in (noise.white, noise.quick)
     )
+    # of samples that were computed; of a value that is repeated nothing is known
+    least = converter_noise(block.six)
+    white, quick = (np.where(n > 0, np.maximum(n, least), n) for n in (white, quick))
     more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0) + coarser
     for found in (white, quick, more, loud):
         found.setflags(write=False)

@@ -33,6 +33,10 @@ PARTS, PIECES_OF_A_PART = 4, 6
 
 PIECES = PARTS * PIECES_OF_A_PART
 
+OTHER_PIECES = 29
+"""The same, with no divisor in common: a vibration that turns by whole periods from
+piece to piece is the same in all of either, and in the others it is not."""
+
 MOST_SAMPLES = 50_000
 """Samples of a window that are looked at."""
 
@@ -84,13 +88,15 @@ def one_place_of_period(six: Array, period: int) -> OnePlace | None:
     live = np.flatnonzero(2 * np.isfinite(six).sum(axis=0) > len(six))
     x = six[:MOST_SAMPLES, live]
     x = x[np.isfinite(x).all(axis=1)]
-    each = (len(x) - period) // (period * PIECES)
-    if each < 1 or not len(live):
+    if len(x) < period * (OTHER_PIECES + 1) or not len(live):
         return None
-    y = _less_moving_mean(x, period)[: each * period * PIECES]
-    places = y.reshape(PIECES, each, period, -1).mean(axis=1)
-    places *= period / (period - 1)  # (1)
-    mean, error = places.mean(axis=0), places.std(axis=0, ddof=1) / np.sqrt(PIECES)
+    y = _less_moving_mean(x, period)
+    places, others = (_by_place(y, period, n) for n in (PIECES, OTHER_PIECES))
+    mean = places.mean(axis=0)
+    error = np.maximum(
+        places.std(axis=0, ddof=1) / np.sqrt(PIECES),
+        others.std(axis=0, ddof=1) / np.sqrt(OTHER_PIECES),
+    )
     least = np.maximum(np.finfo(float).eps * np.abs(x).max(axis=0), LEAST_ERROR)
     # in units of one error for all: where the order varies, places have their own
     square = mean**2 / np.maximum((error**2).mean(axis=0), least**2)
@@ -103,6 +109,13 @@ def one_place_of_period(six: Array, period: int) -> OnePlace | None:
     found.size[live] = mean[place]
     found.error[live] = np.maximum(error[place], least)
     return found
+
+
+def _by_place(y: Array, period: int, pieces: int) -> Array:
+    """C of (1) in each of some pieces, (pieces, k, outputs)."""
+    each = len(y) // (period * pieces)
+    parts = y[: each * period * pieces].reshape(pieces, each, period, -1)
+    return np.asarray(parts.mean(axis=1) * period / (period - 1))  # (1)
 
 
 def _less_moving_mean(x: Array, period: int) -> Array:

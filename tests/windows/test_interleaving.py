@@ -112,3 +112,13 @@ def test_outputs_without_values_and_windows_without_samples() -> None:
     for few in (0, 1, 45):
         assert one_place_of_period(six[:few], 2) is None
     assert one_place_of_period(np.full((N, 6), np.nan), 2) is None
+
+
+def test_a_hum_that_turns_by_whole_periods_from_piece_to_piece_is_seen_as_one() -> None:
+    """What windows of a finite length let through of it is as large in all of them."""
+    length = N // (3 * 24) * 3  # of a piece of places of 3
+    for turns in (3, 5):
+        hum = np.cos(2 * np.pi * (1 / 3 + turns / length) * T + 0.4) * NOISE * 1000
+        found = one_place_of_period(noise(14) + hum, 3)
+        assert found is not None
+        assert not found.steady or np.abs(found.t).max() < CLEAR

@@ -242,11 +242,13 @@ def test_residuals_of_what_is_fitted_are_those_of_a_dense_fit(
     for p in free:
         at = d.small_rotation + 2 * p + np.arange(2)
         value[at] += priors.SMALL_ROTATION**2 * one.dense.design[:, at].T @ back
+    # rotations of up to a radian, by rows that are known a million times better, leave
+    # six digits of what is fitted to them
     np.testing.assert_allclose(
-        estimates_by_column(state, d), value, rtol=1e-5, atol=1e-9
+        estimates_by_column(state, d), value, rtol=1e-5, atol=1e-8
     )
     rest = (one.dense.y - one.dense.design @ value).reshape(ROWS, 6)
-    assert_agree(one.fitted.residual(), rest)
+    np.testing.assert_allclose(one.fitted.residual(), rest, rtol=1e-5, atol=1e-8)
 
 
 def test_squares_are_those_of_the_covariance() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -171,3 +172,14 @@ def test_gyroscopes_that_follow_other_turns_are_wrong_without_any_angle(
 ) -> None:
     found = of(tmp_path / "twelve", 93_000_003, mistake)
     assert not found.go and why in found.says
+
+
+@pytest.mark.thorough
+def test_a_simulation_without_noise_has_an_answer(tmp_path: Path) -> None:
+    """Its estimates went without bounds until nothing could be inverted."""
+    rng = np.random.default_rng(7002)
+    bench = replace(drawn(rng), acc_noise=0.0, gyr_noise=0.0, grain=0.0)
+    written = session(bench, (), rng)
+    write(tmp_path / "s", written)
+    found = judged(tmp_path / "s", written.truth(bench), bench.grade, False, 200.0)
+    assert found.caught != "exit 70" and not (found.late or found.wrong)

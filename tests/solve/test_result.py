@@ -39,7 +39,7 @@ def estimated(**known: Any) -> ParameterEstimate:
     end = EndValues(np.zeros((6, 1)), np.zeros((6, 6, 1)), np.array([False]))
     given = SimpleNamespace(
         options=options, unoriented=np.zeros(5, dtype=bool), names=("acc_bias.x",),
-        width=1, end_values=end,
+        width=1, end_values=end, x=SimpleNamespace(clock_sigma=0.0),
     )  # fmt: skip
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "undetermined": (), "parameter_set": given,

@@ -35,16 +35,23 @@ def state_at_estimate(
     if d.unoriented.any():
         kept[d.rotations] = True
     values = np.where(kept, estimates_by_column(fitted.state, d), 0.0)
+    return state_with_values(d, nominal, fitted.members, values), values
+
+
+def state_with_values(
+    dictionary: Dictionary, nominal: State, members: Sequence[Member], values: Array
+) -> State:
+    """The nominal state, changed by values (k,) of all columns, of a set's members."""
+    d = dictionary
     measured = 3 * d.position_count if d.attitude >= 0 else 0
-    state = State(
+    return State(
         nominal.bias + values[d.bias : d.bias + 6],
         nominal.scale + values[d.scale : d.scale + 6],
         values[d.rotations].reshape(-1, 2),
         values[d.earth : d.earth + 3] if d.earth >= 0 else np.zeros(3),
-        (*nominal.terms, *_effect_terms(fitted, values)),
+        (*nominal.terms, *_effect_terms(members, values)),
         values[max(d.attitude, 0) :][:measured].reshape(-1, 3),
     )
-    return state, values
 
 
 def columns_in_state(dictionary: Dictionary, members: Sequence[Member]) -> Index:
@@ -53,9 +60,9 @@ def columns_in_state(dictionary: Dictionary, members: Sequence[Member]) -> Index
     return np.concatenate([g.columns for g in groups if g.in_state])
 
 
-def _effect_terms(fitted: Set, values: Array) -> Iterator[Term]:
-    """Effects of a set with their estimated parameters."""
-    for _, group in fitted.members:
+def _effect_terms(members: Sequence[Member], values: Array) -> Iterator[Term]:
+    """Effects of a set's members with their estimated parameters."""
+    for _, group in members:
         if isinstance(group.effect, Motion | Sensor):
             parameters = np.zeros(len(group.effect.params))
             parameters[list(group.params)] = values[group.columns]
@@ -64,6 +71,10 @@ def _effect_terms(fitted: Set, values: Array) -> Iterator[Term]:
 
 MAX_NEWTON_STEPS = 6
 """Steps of Gauss and Newton for one set."""
+
+MAX_STEP, MAX_ROTATION = 30.0, 1.0
+"""Longest step of a parameter, in its typical sizes, and of a position's rotation, rad:
+no device is as far off, and rows are not linear over more."""
 
 CONVERGED = 0.03
 """Largest step of a column, in standard deviations, that counts as none."""
@@ -157,7 +168,7 @@ class GaussNewton:
             settled, _ = self.estimate(state, values, members, sizes)
             sizes = settled.sizes
             before = values
-            state, values = self.state_at_estimate(settled)
+            state, values = self._step_towards(settled, before)
             if self.largest_step(settled, before, values) < CONVERGED:
                 break
         return state, values, settled
@@ -187,6 +198,22 @@ class GaussNewton:
         for group, angle in zip(new, angles, strict=True):
             values[group.columns] = small[group.position] = angle
         return replace(state, small_rotation=small), values
+
+    def _step_towards(self, fitted: Set, before: Array) -> tuple[State, Array]:
+        """The state at a set's estimate, or on the way there if that is far off.
+
+        `before` (k,) are the columns' values where the rows were linearised. Without
+        its limits the way of an estimate that rows contradict has no end.
+        """
+        d = self.dictionary
+        state, values = self.state_at_estimate(fitted)
+        most = MAX_STEP * d.typical
+        most[d.rotations] = MAX_ROTATION
+        beyond = float((np.abs(values - before) / most).max())
+        if beyond <= 1.0:
+            return state, values
+        values = before + (values - before) / beyond
+        return state_with_values(d, self.nominal, fitted.members, values), values
 
     def state_at_estimate(self, fitted: Set) -> tuple[State, Array]:
         """The state at a set's estimate, and its columns' values."""

@@ -18,7 +18,7 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Sizes
-from fieldcal.model.search.gauss_newton import GaussNewton
+from fieldcal.model.search.gauss_newton import MAX_ROTATION, MAX_STEP, GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult, resume
 from fieldcal.model.search.offers import Offers, OfferTable
 from fieldcal.model.search.pairs import offered_pairs
@@ -494,3 +494,33 @@ def test_all_the_parameters_of_a_cause() -> None:
     assert (wide.size, wide.instability) == (offer.size, offer.instability)
     same = replace(offer, member=(cause, whole))
     assert same.with_all_parameters() is same
+
+
+def test_a_step_beyond_what_is_linear_ends_on_the_way() -> None:
+    """Where rows contradict each other, estimates have no bounds; the state has."""
+    fit = fit_of(state_of())
+    d = fit.dictionary
+    zeros = np.zeros(d.width)
+    settled, _ = fit.estimate(nominal(), zeros, ())
+    whole = fit.state_at_estimate(settled)[1]
+    near, values = fit._step_towards(settled, zeros)
+    np.testing.assert_array_equal(values, whole)
+    np.testing.assert_array_equal(
+        near.bias, nominal().bias + whole[d.bias : d.bias + 6]
+    )
+    # from a turn of 4 rad it is a quarter of the way, in all columns alike
+    far = zeros.copy()
+    first = d.rotations.start
+    far[first] = whole[first] + 4 * MAX_ROTATION
+    state, values = fit._step_towards(settled, far)
+    np.testing.assert_allclose(values, far + (whole - far) / 4, rtol=1e-12, atol=1e-15)
+    assert state.small_rotation.flat[0] == pytest.approx(values[first])
+    np.testing.assert_allclose(
+        state.bias, nominal().bias + values[d.bias : d.bias + 6], rtol=1e-12
+    )
+    # and so for a parameter, by its typical size
+    own = next(c for c in d.causes if c.name == "angle_offset").variants[0].columns[0]
+    far = zeros.copy()
+    far[own] = 2 * MAX_STEP * d.typical[own]
+    _, values = fit._step_towards(settled, far)
+    np.testing.assert_allclose(values, far + (whole - far) / 2, rtol=1e-12, atol=1e-15)

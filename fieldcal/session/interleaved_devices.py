@@ -26,6 +26,7 @@ import numpy as np
 from fieldcal.core.once import once_per_block
 from fieldcal.core.samples import Array, Block, Mask
 from fieldcal.windows.interleaving import (
+    MOST_SAMPLES,
     PERIODS,
     PIECES,
     OnePlace,
@@ -94,7 +95,7 @@ def _found_between(block: Block, ends: tuple[tuple[int, int], ...]) -> OnePlace 
     if 2 * len(known) <= len(parts):
         return None
     places = [one for one, _ in known]
-    steps = np.min([_steps(part.six) for _, part in known], axis=0)
+    steps = np.min([_steps(part.six[:MOST_SAMPLES]) for _, part in known], axis=0)
     if np.count_nonzero(_differ(places, steps, period)) < LEAST_OUTPUTS:
         return None
     force = np.array([np.nanmean(part.acc, axis=0) for _, part in known])

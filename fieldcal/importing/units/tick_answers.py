@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.importing.units.scales import GYR_OUT, GYR_SCALES, Scale, rounded_text
-from fieldcal.importing.words.tick_units import tick_seconds
+from fieldcal.importing.words.tick_units import SECONDS, tick_seconds
 
 TICKS = ("0.1ms", "10us", "1/32768s", "31.25us", "39.0625us", "100ns")
 """Ticks of usual timers: decimal ones, those of a watch crystal and of 32 kHz, those of
@@ -56,16 +56,21 @@ def unknown_tick_option(reads: float, second: float) -> str:
     '--time-unit 5.95ns, if its times count about so much and its rates are rad/s (the \
 clock of its timer says it exactly)'
     """
-    length = second / reads
-    unit, size = next(
-        (u, s) for u, s in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
-        if length >= s or u == "ns"
-    )  # fmt: skip
     return (
-        f"--time-unit {rounded_text(length / size)}{unit}, if its times count about so"
+        f"--time-unit {written_tick(second / reads, 3)}, if its times count about so"
         f" much and its rates are {PLAIN[0].unit} (the clock of its timer says it"
         " exactly)"
     )
+
+
+def written_tick(length: float, digits: int) -> str:
+    """A tick of some seconds as so many of the largest unit of which it is one or more.
+
+    >>> written_tick(3.125e-5, 6), written_tick(2e-10, 3)
+    ('31.25us', '0.2ns')
+    """
+    unit = next((u for u, size in SECONDS.items() if length >= size), "ns")
+    return f"{rounded_text(length / SECONDS[unit], digits)}{unit}"
 
 
 def _are_near(length: float, tick: float | None) -> bool:

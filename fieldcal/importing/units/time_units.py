@@ -16,7 +16,7 @@ from fieldcal.core.samples import IMPOSSIBLE_RATE_HZ, Array
 from fieldcal.importing.read_options import TIME_UNITS, seconds_in
 from fieldcal.importing.units.scales import MIN_ROWS_ALONE, rounded_text
 from fieldcal.importing.units.slow_times import turns_at_once
-from fieldcal.importing.words.tick_units import SECONDS
+from fieldcal.importing.units.tick_answers import written_tick
 
 RATES_HZ = (0.9, 8000.0)
 """What a logger of an IMU writes in a second: of 1 Hz, a clock shows a little less."""
@@ -250,10 +250,7 @@ def tick_at_rate(t: Array, rate_hz: float) -> str:
     """
     if not (step := _step(t)):
         return ""
-    length = 1 / (rate_hz * step)
-    names = (u for u, size in SECONDS.items() if length >= size)
-    unit = next(names, "ns")
-    return f"{rounded_text(length / SECONDS[unit], 6)}{unit}"
+    return written_tick(1 / (rate_hz * step), 6)
 
 
 def time_unit_of_ticks(t: Array) -> str:

@@ -134,8 +134,8 @@ def _counted_times(
         return {"rate_hz": rate, "rate_sigma_hz": args.rate_sigma}
     sys.stderr.write(
         f"{folder}: its times are counted at {rate:g} Hz, which is taken for right"
-        f" within {100 * CLOCK_SIGMA:g} %, as clocks of sensors are: the scale factors of"
-        " gyroscopes that turns tell are no better; if the rate was measured, import"
+        f" within {100 * CLOCK_SIGMA:g} %, as clocks of sensors are: the scale factors"
+        " of gyroscopes that turns tell are no better; if the rate was measured, import"
         " it again with --rate-sigma, its ± in Hz\n"
     )
     return {"rate_hz": rate, "rate_sigma_hz": float(f"{CLOCK_SIGMA * rate:.4g}")}

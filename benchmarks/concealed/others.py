@@ -18,7 +18,7 @@ from fieldcal.sim_device.profile_file import profile_from_tables
 CHANCE = ("angle_setting", "random_walk")
 CHAIN = (
     *("bump", "stuck", "quantisation", "saturation", "dropped", "clock_skew"),
-    *("decode_fault", "noise_level", "mounting"),
+    *("decode_fault", "noise_level", "mounting", "smoothing"),
 )
 SPECIAL = ("gravity_error", "earth_rate", "bandwidth", "vibration_rectification")
 APART = (
@@ -149,6 +149,7 @@ def chain(name: str, rng: np.random.Generator) -> Session:
         "decode_fault": {"channel": "ay", "kind": kind},
         "noise_level": {"channel": channel, "ratio": float(rng.uniform(2.5, 6))},
         "mounting": {"axes": str(rng.choice(axes))},
+        "smoothing": dict.fromkeys(("acc", "gyr"), float(rng.uniform(0.15, 1.5))),
     }  # fmt: skip
     host = effects.kind(name).EXAMPLE.host_clock
     session = replace(session, label=name, host_clock=host)

@@ -9,12 +9,14 @@ a mild and a strong case of it:
     saturation    rails that one window, or the rates of turns, just reach, or overrun
     quantisation  steps of 1.4 or 1.8 times the noise, which do not move the means yet
     decode_fault  the low byte of a 16-bit count taken for a signed one
+    smoothing     a low-pass of first order over 10 or 40 samples, in full precision
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from benchmarks.injected.physics import Added, CannotShow, Rng, direction
 from benchmarks.injected.readout import grid, put_out, rails
@@ -194,6 +196,20 @@ def _minority(flags: NDArray[np.bool_]) -> float:
     return min(share, 1 - share)
 
 
+def smoothing(scene: Scene, sigmas: float, rng: Rng) -> Added:
+    """A program that keeps a share of the previous output in each sample.
+
+    Missing samples are passed over, as its program does not see them.
+    """
+    samples = (40.0 if sigmas > STRONG else 10.0) * float(rng.uniform(0.7, 1.4))
+    kept, six = np.exp(-1 / samples), scene.block.six.copy()
+    known = np.isfinite(six).all(axis=1)
+    begin = six[known][:1]
+    share = [1 - kept], [1.0, -kept]
+    six[known] = lfilter(*share, six[known] - begin, axis=0) + begin
+    return Added(scene.but(six), f"{samples:.1f} samples", {})
+
+
 CHAIN = {
     "hum": hum,
     "bump": bump,
@@ -201,4 +217,5 @@ CHAIN = {
     "saturation": saturation,
     "quantisation": quantisation,
     "decode_fault": decode_fault,
+    "smoothing": smoothing,
 }

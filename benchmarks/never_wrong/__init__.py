@@ -112,8 +112,9 @@ GROUPED = {
     "gravity's direction alone; a device that calibrates itself; a falling supply": (
         "gravity's direction alone", "calibrates itself", "supply falls",
     ),
-    "corrected in steps, biases that shift at times, axes of the screen": (
+    "corrected in steps, biases that shift at times, axes of the screen, smoothed": (
         "corrected in steps", "biases shifted at times", "axes of the screen",
+        "smoothed",
     ),
     "two days, two devices or two mountings in one": (
         "two days joined", "device exchanged", "device remounted",

@@ -106,6 +106,24 @@ def axes_of_screen(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=Samples(s.t, acc, gyr))
 
 
+def smoothed(written: Written, bench: Bench, rng: Rng) -> Written:
+    """A program smooths the outputs and prints them with a few decimals.
+
+    Exponentially, with a time constant of 0.05 to 3 s, once in two times; otherwise by
+    the mean of the last 0.1 to 3 s. With 2 to 6 decimals, rates with one more.
+    """
+    s, digits = written.samples, int(rng.integers(2, 7))
+    exponential, seconds = rng.random() < 0.5, log_uniform(rng, 0.05, 3.0)
+    kept = np.exp(-1 / bench.rate / seconds) if exponential else 0.0
+    many = 1 if exponential else max(2, round(2 * seconds * bench.rate))
+    over, back = np.full(many, (1 - kept) / many), [1.0, -kept]
+    acc, gyr = (
+        np.round(lfilter(over, back, out - out[0], axis=0) + out[0], digits + more)
+        for out, more in ((s.acc, 0), (s.gyr, 1))
+    )
+    return replace(written, samples=Samples(s.t, acc, gyr))
+
+
 OF_FIRMWARE: dict[str, After] = {
     "gravity's direction alone": gravity_direction,
     "calibrates itself": calibrates_itself,
@@ -113,4 +131,5 @@ OF_FIRMWARE: dict[str, After] = {
     "corrected in steps": corrected_in_steps,
     "biases shifted at times": shifted_at_times,
     "axes of the screen": axes_of_screen,
+    "smoothed": smoothed,
 }

@@ -116,12 +116,12 @@ def run(args: argparse.Namespace) -> int:
 def _solve_and_decide(args: argparse.Namespace, session: Session) -> Calibration:
     """Calibration of a session with what the options ask for, and its decision."""
     from fieldcal.commands.install_values import add_install_values
-    from fieldcal.evaluation.omitted_effects import with_repaired_bytes
+    from fieldcal.evaluation.repaired_session import repaired_session
     from fieldcal.evaluation.usable_windows import usable_windows
 
     repaired: tuple[str, ...] = ()
     if not args.as_printed:
-        session, repaired = with_repaired_bytes(session)
+        session, repaired = repaired_session(session)
     still = usable_windows(session)
     found = _solve_session(args, session, still)
     found = replace(found, warnings=(*repaired, *found.warnings))

@@ -157,6 +157,14 @@ class DecodeFault(Chain):
                 found[first : first + 3] = _put_back(recording, first)
         return [fault for fault in found if fault is not None]
 
+    def say_repaired(self, fault: Fault) -> str:
+        """Which channel, and how its bytes were taken."""
+        return (
+            f"{fault.channel}: bytes were decoded wrongly"
+            f" ({fault.values.get('kind', 'unknown')}) and are put right here; mend the"
+            " driver that wrote them"
+        )
+
 
 def _put_back(recording: CheckedSamples, first: int) -> list[Fault | None]:
     """Faults of a sensor's three channels with samples that are off by one size."""

@@ -20,7 +20,6 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import TILTS
-from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import (
     calibration_of_set,
@@ -32,15 +31,11 @@ from fieldcal.diagnosis.findings.unknown_mismatch import (
     list_positions,
 )
 from fieldcal.diagnosis.prepare import PreparedRecording
-from fieldcal.diagnosis.signal.chain import find_in_recorded_samples
 from fieldcal.diagnosis.wording.paragraph import angle_errors_text, exchange_text
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.physics.effect import Chain, Scatter
-from fieldcal.session.folder import Session
-
-BYTES = "decode_fault"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,30 +61,6 @@ class OmittedEffects:
             self.shift_sigmas, key=lambda n: abs(self.shift_sigmas[n]), default=""
         )
         return name, self.shift_sigmas.get(name, 0.0)
-
-
-def with_repaired_bytes(session: Session) -> tuple[Session, tuple[str, ...]]:
-    """The session with wrongly decoded bytes corrected, and sentences about them."""
-    if not session.positions:
-        return session, ()
-    found = find_in_recorded_samples(BYTES, session.block, session.about)
-    faults = [fault for fault in found if fault.mended is not None]
-    if not faults:
-        return session, ()
-    six, sentences = session.block.six, []
-    for fault in faults:
-        if fault.mended is None:
-            continue
-        c = CHANNELS.index(fault.channel)
-        six[:, c] = fault.mended[:, c]
-        sentences.append(
-            f"{fault.channel}: bytes were decoded wrongly"
-            f" ({fault.values.get('kind', 'unknown')}) and are put right here; mend the"
-            " driver that wrote them"
-        )
-    right = replace(session, warnings=())
-    right.__dict__["block"] = replace(session.block, acc=six[:, :3], gyr=six[:, 3:])
-    return right, tuple(sentences)
 
 
 def omitted_effects(

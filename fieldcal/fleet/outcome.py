@@ -20,8 +20,8 @@ from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
-from fieldcal.evaluation.omitted_effects import with_repaired_bytes
 from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.repaired_session import repaired_session
 from fieldcal.evaluation.solution import solve_prepared
 from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.fleet.reduced import reduce_session
@@ -87,7 +87,7 @@ class SessionTask:
         return failed_session(folder, said, mark)
 
     def _process(self, folder: Path) -> StoredSession:
-        session, repaired = with_repaired_bytes(Session.open(folder))
+        session, repaired = repaired_session(Session.open(folder))
         still = usable_windows(session)
         prepared = PreparedSession(session, still)
         found = solve_prepared(prepared)

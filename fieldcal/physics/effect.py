@@ -292,6 +292,10 @@ class Chain(Effect):
     def find(self, recording: CheckedSamples) -> list[Fault]:
         """Look for it in the samples."""
 
+    def say_repaired(self, fault: Fault) -> str:
+        """Sentence for a calibration of samples in which it was undone."""
+        return f"{fault.channel}: {self.id} was found and is undone here"
+
 
 def six(unit_acc: str, acc: float, unit_gyr: str, gyr: float) -> tuple[Param, ...]:
     """Parameters ax ay az gx gy gz with their units and typical sizes."""

@@ -12,6 +12,7 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.repaired_session import repaired_session
 from fieldcal.evaluation.solution import solve_prepared
 from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
@@ -31,7 +32,7 @@ def judge_session(
         If no window can be used.
 
     """
-    session = Session.open(folder)
+    session, _ = repaired_session(Session.open(folder))
     windows = usable_windows(session)
     previous = None if before is None else before.explanation
     prepared = PreparedSession(session, windows, previous)

@@ -349,3 +349,17 @@ def test_axes_of_a_screen_are_those_of_the_device_in_the_last_positions() -> Non
         assert not other[3:].any()
         assert means[:, 2] == pytest.approx(honest[:, 2])
         assert abs(means[0] @ honest[0]) < 1e-9  # g along y becomes g along x
+
+
+def test_smoothed_outputs_are_late_and_have_few_decimals() -> None:
+    bench = replace(_ideal("five"), acc_noise=0.02, gyr_noise=1e-3)
+    quieter, digits = [], set()
+    for seed in range(8):
+        plain = recorded(bench, np.random.default_rng(seed)).acc
+        s = _made("smoothed", bench, seed).samples
+        exact = [n for n in range(2, 7) if np.array_equal(s.acc, np.round(s.acc, n))]
+        digits.add(exact[0])
+        assert s.acc.mean() == pytest.approx(plain.mean(), abs=0.2)
+        quieter.append(np.diff(s.acc, axis=0).std() / np.diff(plain, axis=0).std())
+    assert max(quieter) < 0.5
+    assert len(digits) > 2 and digits <= {2, 3, 4, 5, 6}

@@ -69,6 +69,23 @@ def test_wrongly_decoded_bytes_are_put_right(
     assert any("bytes were decoded wrongly" in w for w in said["warnings"])
 
 
+@pytest.mark.parametrize(
+    "tau",
+    [{"acc": 1.2, "gyr": 1.2}, pytest.param({"gyr": 0.4}, marks=pytest.mark.thorough)],
+)
+def test_smoothed_outputs_are_calibrated_as_the_device_sends_them(
+    tau: dict[str, float], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Windows begin at the end of a turn, when smoothed outputs are still on it."""
+    profile = device(checked_effect("smoothing", tau))
+    code, said = solved(profile, tmp_path / "s", capsys, model=UNEXAMINED["model"])
+    assert code == 0 and said["verdict"] == "good"
+    assert np.abs(off(said, profile)).max() < 4.5
+    undone = [w for w in said["warnings"] if "a program smoothed the outputs" in w]
+    seconds = [float(w.split("time constant of ")[1].split()[0]) for w in undone]
+    assert seconds == pytest.approx(list(tau.values()), rel=0.1)
+
+
 @pytest.mark.thorough
 def test_bytes_are_put_right_for_a_method_that_is_asked_for(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -43,6 +43,17 @@ def test_the_signal_chain() -> None:
     assert passed("mounting:unit=mrad/s", [0.5], channel=4) == [500]
 
 
+def test_a_smoothed_output_goes_half_of_the_way_in_each_sample() -> None:
+    half = f"smoothing:gyr={1 / np.log(2)}"
+    got = passed(half, [4, 0, 8, 8], channel=3)
+    np.testing.assert_allclose(got, [4, 2, 5, 6.5])
+    assert passed(half, [4, 0, 8, 8]) == [4, 0, 8, 8]  # of the accelerometers
+    chain = SignalChain(PLAIN.having(parse(half)), 0)
+    t, x = np.arange(4.0), np.tile([4.0, 0.0, 8.0, 8.0], (6, 1))
+    pieces = [chain.passes(t[i], x[:, i]) for i in ([0], [1, 2], [3])]
+    np.testing.assert_allclose(np.hstack(pieces)[5], [4, 2, 5, 6.5])
+
+
 def test_the_full_scale_of_the_device_clips() -> None:
     profile = replace(PLAIN, range=replace(PLAIN.range, acceleration=6.0))
     np.testing.assert_allclose(at_rest(profile).acc[-1], [-6, -6, 4.8])

@@ -108,11 +108,20 @@ def check_chain(block: Block, about: Description) -> CheckedRecording:
 
 
 def _correct(
-    block: Block, usable: Mask, about: Description, faults: list[tuple[str, Fault]]
+    block: Block,
+    usable: Mask,
+    about: Description,
+    faults: list[tuple[str, Fault]],
+    described: bool = False,
 ) -> tuple[Block, CheckedSamples]:
-    """Correct the faults that can be undone; they are appended to `faults`."""
+    """Correct the faults that can be undone; they are appended to `faults`.
+
+    If `described`, those of session.toml are left as they are.
+    """
     samples = samples_to_check(block, usable, about)
     for name in _ids_by_treatment("mend"):
+        if described and _chain_effect(name).misread:
+            continue
         for fault in _find(name, samples):
             faults.append((name, fault))
             if fault.mended is not None:
@@ -136,13 +145,19 @@ def _on_one_grid_each(
     return samples_to_check(block, usable, about)
 
 
-def find_in_recorded_samples(
-    name: str, block: Block, about: Description
-) -> list[Fault]:
-    """Faults of one effect in the samples as recorded, before any correction."""
+def repair_samples(
+    block: Block, about: Description
+) -> tuple[Block, list[tuple[str, Fault]]]:
+    """Undo what was done to the samples of a device that session.toml describes.
+
+    Returns them, and the faults that were undone with the ids of their effects.
+    """
+    faults: list[tuple[str, Fault]] = []
     if about.means_only:
-        return []
-    return _find(name, samples_to_check(block, np.isfinite(block.six), about))
+        return block, faults
+    usable = np.isfinite(block.six)
+    block, _ = _correct(block, usable, about, faults, described=True)
+    return block, [(name, fault) for name, fault in faults if fault.mended is not None]
 
 
 def recheck_without_lines(
@@ -163,10 +178,14 @@ def _ids_by_treatment(treatment: str) -> list[str]:
 
 
 def _find(name: str, samples: CheckedSamples) -> list[Fault]:
+    return _chain_effect(name).find(samples)
+
+
+def _chain_effect(name: str) -> Chain:
     effect = catalogue()[name]
     if not isinstance(effect, Chain):
         raise TypeError(f"{name} is no effect on samples")
-    return effect.find(samples)
+    return effect
 
 
 def _mend_samples(block: Block, fault: Fault) -> Array:

@@ -1,0 +1,32 @@
+"""A session whose samples are as the device sent them.
+
+What a driver or a program did to them afterwards, and can be undone, is undone: before
+windows are judged and averaged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fieldcal.diagnosis.signal.chain import repair_samples
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Chain
+from fieldcal.session.folder import Session
+
+
+def repaired_session(session: Session) -> tuple[Session, tuple[str, ...]]:
+    """The session with corrected samples, and sentences about what was undone."""
+    if not session.positions:
+        return session, ()
+    block, faults = repair_samples(session.block, session.about)
+    if not faults:
+        return session, ()
+    right = replace(session, warnings=())
+    right.__dict__["block"] = block
+    effects = catalogue()
+    said = (
+        effect.say_repaired(fault)
+        for name, fault in faults
+        if isinstance(effect := effects[name], Chain)
+    )
+    return right, tuple(said)

@@ -22,11 +22,11 @@ import numpy as np
 from fieldcal.core.samples import ACC, CHANNELS, GYR
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
-from fieldcal.windows.smoothing import (
-    common_smoothing,
-    find_smoothing,
-    without_smoothing,
-)
+from fieldcal.windows.smoothing import find_smoothing, without_smoothing
+
+LEAST_S = 0.15
+"""Least time constant, s: what is quicker is over when a window begins, and turns tell
+it better (`bandwidth`)."""
 
 
 class Smoothing(Chain):
@@ -48,14 +48,10 @@ class Smoothing(Chain):
         block = recording.block
         six, t = block.six, block.t
         interval = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
-        windows, steps = recording.windows, recording.steps
-        both = common_smoothing(
-            find_smoothing(six[:, ACC], windows, steps[ACC]),
-            find_smoothing(six[:, GYR], windows, steps[GYR]),
-        )
+        both = find_smoothing(six, recording.windows, recording.steps)
         out = []
         for name, triad, found in zip(("acc", "gyr"), (ACC, GYR), both, strict=True):
-            if found is None:
+            if found is None or interval * found.samples < LEAST_S:
                 continue
             six = six.copy()
             six[:, triad] = without_smoothing(six[:, triad], t, found.kept)

@@ -20,7 +20,7 @@ from fieldcal.diagnosis.factory_left import enlarge_to_shown_grade
 from fieldcal.diagnosis.fit import build_fit, fit_calibration_only
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.effects import catalogue
-from fieldcal.model import thresholds
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.sinking import NAME as SINKING
 from fieldcal.model.evidence.sets import Set
@@ -36,20 +36,11 @@ from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
 from fieldcal.model.posterior.turn_force_information import turn_force_information
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.row_source import RowSource
-from fieldcal.model.search.inference import (
-    TIME_CONSTANT_LOG_LOSS,
-    Inference,
-    InferenceResult,
-    resume,
-)
-from fieldcal.model.search.selection import MIN_LOG_RISE
+from fieldcal.model.search.inference import Inference, InferenceResult, resume
 from fieldcal.model.search.settled_scores import correct_scores
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.turns.turn import Turn
-
-MAX_RESUMPTIONS = 2
-"""Most times that a search is resumed from an alias that proved better."""
 
 
 @dataclass(frozen=True)
@@ -209,11 +200,13 @@ def explain(
     begin = None if before is None else _starting_causes(before)
     found = Inference(fit).run(begin)
     posterior = _calculate_posterior(found)
-    for _ in range(0 if found.exhausted else MAX_RESUMPTIONS):
+    for _ in range(0 if found.exhausted else tolerances.MAX_RESUMPTIONS):
         better, now = found.search.best_visited, found.best
         # the same causes, with shapes between the grid points, are no improvement
         if found.search.sets.corrected_score(better) <= now.score + (
-            TIME_CONSTANT_LOG_LOSS if better.keys == now.keys else MIN_LOG_RISE
+            thresholds.SIGMA_LOG_LOSS
+            if better.keys == now.keys
+            else thresholds.MIN_LOG_RISE
         ):
             break
         # an alias explains the rows better than the cause that it was an alias of

@@ -20,7 +20,7 @@ from fieldcal.diagnosis.signal.chain import (
 from fieldcal.diagnosis.signal.line import LineRemainder, SpectralLine
 from fieldcal.diagnosis.signal.spectrum import find_lines, subtract_lines
 from fieldcal.effects import catalogue
-from fieldcal.model import thresholds
+from fieldcal.model import detections, thresholds
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.base_sway import BaseSway, find_base_sway
 from fieldcal.model.rows.block_means import masked
@@ -37,9 +37,6 @@ from fieldcal.session.description import Description
 from fieldcal.session.direction_alone import refuse_direction_alone
 from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 from fieldcal.session.mixed_devices import refuse_mixed_devices
-
-MIN_WINDOW_SAMPLES = 20
-"""Fewest samples of a window that is used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,19 +191,19 @@ def _without_constant_temperature(rows: Rows, warmth: Thermometer) -> Rows:
 def _refuse_empty(block: Block, about: Description) -> None:
     windows = window_bounds(block, about)
     many = windows[:, 1] - windows[:, 0]
-    if not (many >= MIN_WINDOW_SAMPLES).any():
+    if not (many >= detections.MIN_WINDOW_SAMPLES).any():
         if not about.positions:
             raise InputError(
                 f"session.toml has no [[position]], and {len(block)} samples are less"
-                f" than the {MIN_WINDOW_SAMPLES} of the shortest window: record longer,"
-                " or at a higher rate"
+                f" than the {detections.MIN_WINDOW_SAMPLES} of the shortest window:"
+                " record longer, or at a higher rate"
             )
         held, most = len(about.positions), int(many.max(initial=0))
         if most:
             raise InputError(
                 f"the longest window in session.toml holds {most} samples, and"
-                f" {MIN_WINDOW_SAMPLES} are needed: rest longer, or record at a higher"
-                " rate"
+                f" {detections.MIN_WINDOW_SAMPLES} are needed: rest longer, or record"
+                " at a higher rate"
             )
         raise InputError(
             f"none of the {held} windows in session.toml holds a sample; these run"

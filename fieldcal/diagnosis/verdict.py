@@ -44,7 +44,6 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.model.rows.window_bounds import window_bounds
-from fieldcal.model.search.selection import MAX_CAUSES
 from fieldcal.session.description import Description
 
 
@@ -194,8 +193,9 @@ def _impossible_facts(explanation: Explanation) -> list[str]:
     values += impossible_turn_scales(explanation).values()
     if explanation.inferred.exhausted:
         values.append(
-            f"{MAX_CAUSES} causes together do not explain it: in its windows the"
-            " device was turned, or its columns are not what session.toml says"
+            f"{thresholds.MAX_CAUSES} causes together do not explain it: in its"
+            " windows the device was turned, or its columns are not what session.toml"
+            " says"
         )
     return values + misdirected_turns(_unexplained_turns(explanation))
 

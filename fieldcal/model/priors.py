@@ -23,9 +23,11 @@ INSTABILITY_TAIL = 8.0
 """The same for instability: a scatter ten times that of devices has another cause."""
 
 BIAS: Array = np.repeat([0.3, 2e-2], 3)
+"""Typical bias: 30 mg, 1 deg/s; what consumer grade reaches. Here and below, sizes of
+the six outputs are (6,), m/s^2 and rad/s."""
+
 SCALE = 1e-2
-"""Typical change from nominal: 30 mg, 1 deg/s, 1 %; what consumer grade reaches. Here
-and below, sizes of the six outputs are (6,), m/s^2 and rad/s."""
+"""Typical change of a scale factor from nominal: 1 %, as consumer grade has."""
 
 FREE_SIZE = 30.0
 """Prior standard deviation of the parameters that a calibration estimates, in typical
@@ -64,9 +66,26 @@ AXES_LOG_SPREAD = 0.3
 UNKNOWN: Array = np.repeat([2e-2, 1e-3], 3)
 """Typical size of a function that no effect makes: as of effects."""
 
-MAX_COSINES = 80
-"""Largest number of cosines of a walk or of flicker: one for some seconds of a session
-of minutes. Their residual is nearly white."""
+HALF_WAVES = (1.5, 4.0, 9.0, 20.0)
+"""Half waves of a smooth course over the session, from slow to fast."""
+
+SETTLED_S = 1e4
+"""Time since a turn from which nothing changes any more, s: nearly three hours."""
+
+NOISE_SLOPE = 1.0
+"""Typical change of ln P of noise in a factor e of frequency: flicker makes 1, a walk
+2."""
+
+NOISE_AXES_LOG_SPREAD = 0.5
+"""Spread of ln P among the axes of a triad, but for how loud each is: made alike."""
+
+STEADY_HAND_K, WALKING_HAND_K = 2.0, 15.0
+"""k of a hand that does not drift, and of one that does as a random walk, with its
+standard deviation from one hand to the next (`rows.hand_drift`)."""
+
+SAMPLE_ARRIVAL_S, RATE_ERROR = 0.1, 1e-3
+"""Uncertainty of the time between two samples, s, as a host may stamp them late, and of
+the rate of samples as a part of it: it changes with the temperature."""
 
 BESIDE_TILT_DEG = 0.05
 """Possible tilt of the base if offsets of the joints explain the positions, or offsets

@@ -1,7 +1,8 @@
-"""Thresholds of everything that is reported, each with its reason.
+"""Thresholds of everything that is said, each with its reason.
 
-Prior probabilities and typical sizes are in `priors`. Limits of a search, which change
-its duration and nothing that is reported, are in the module of that search.
+From when samples show that something is there at all is in `detections`. Prior
+probabilities and typical sizes are in `priors`. `tolerances` and `resolutions` bound
+errors and the duration of the calculation; they are not meant to decide anything.
 """
 
 from __future__ import annotations
@@ -126,3 +127,108 @@ left, and no digits are told."""
 MEANINGLESS_ANGLE_DEG = 45.0
 """Size of what angles are wrong by, deg, from which they say nothing: half of what
 parts one axis from the next. Nobody sets them so; session.toml is wrong."""
+
+# -- how it is said
+
+LARGEST_LOG_ODDS = 40.0
+"""Largest log odds that are stated: no model is as sure as 2e17 to 1."""
+
+MAX_LISTED_OCCURRENCES, MAX_LISTED_PLACES = 3, 6
+"""Occurrences of an effect that are listed one by one, and places, or positions, that
+one sentence lists: what is read at a glance."""
+
+MAX_DECIMALS = 6
+"""Decimal places above which an uncertainty is written with an exponent."""
+
+# -- when too little was recorded
+
+MIN_ALIKE = 3
+"""Windows, turns or positions from which what one of them has of its own is told from
+what all have: of two that differ, either may be the odd one."""
+
+MIN_SINKING_POSITIONS = 4
+"""Positions with known angles that distinguish a base that turns from biases."""
+
+MAX_PREDICTION_VARIANCE = 1.0
+"""Variance, (m/s^2)^2, of a prediction above which no other window checks it: the wide
+priors of the estimated parameters dominate."""
+
+MIN_FORCE_DIFFERENCE = 1e-4
+"""Difference of specific force between two positions, of gravity, below which an axis
+was not turned: an angle that is 0.006 deg off makes as much."""
+
+MIN_NULL_SHARE = 1e-4
+"""Share of a direction that rows do not determine from which a parameter is not
+determined either: with less, what may be along that direction moves it by 1e-4."""
+
+MAX_PROPOSED_POSITIONS = 4
+"""Positions that are proposed to be added; beyond them another procedure is needed."""
+
+# -- which explanations are looked at
+
+VISIBLE = 1.0
+"""Standard deviations below which nothing shows: the column of a typical size in all
+rows together, an error of linearisation in a mean, a step after which turns need not be
+linearised again."""
+
+SIGMA_LOG_LOSS = VISIBLE**2 / 2
+"""Decrease of ln L if one parameter is off by its own uncertainty: so much of a rise is
+noise."""
+
+MIN_LOG_RISE = 0.02
+"""Largest rise of ln Z that counts as none: a probability moves by half a per cent."""
+
+AVERAGED_LOG_DISTANCE = 4.0
+"""Difference of log evidence to the best, beyond which a hypothesis of a given set is
+left out of its average: odds of 1 to 55."""
+
+ALTERNATIVE_LOG_DISTANCE = 6.0
+"""Predicted distance from the best, ln, up to which other parameters or causes are
+evaluated: what proves likelier by `PREDICTION_SLACK` is then one in twenty."""
+
+OFFERED_LOG_DISTANCE = 12.0
+"""Distance of an offer from the best, ln, up to which it is evaluated: one
+that is further behind has odds of 1 to 160 000."""
+
+COMPARED_LOG_DISTANCE = 20.0
+"""Distance from the best, ln, up to which a set is compared without a part of the rows:
+that part may be what decided against it."""
+
+PREDICTION_SLACK = 3.0
+"""Log evidence that a full evaluation may add to the predicted score of an offer."""
+
+MAX_CAUSES = 12
+"""Causes with which a search ends: rows that take as many are of something else than
+this model, as of windows in which the device was turned, and each further one is paid
+with seconds. Recordings with known causes have up to four."""
+
+LARGE_INSTABILITY = 4.0
+"""Instability, in typical ones, above which causes may hide that show only together."""
+
+MIN_INSTABILITY = 0.2
+"""Smallest instability that is told from none, of the noise of a mean: it widens that
+by 2 %."""
+
+MAX_SHAPE_LOG_SIGMA = 1.0
+"""Largest sigma of the logarithm of a time constant that is used: of a factor e."""
+
+# -- positions and turns that are not as they are stated
+
+CONVERGES_WITHIN_RAD = 0.3
+"""Error of an angle from which the linearisation converges to the right one, rad."""
+
+ALIKE_FORCES = 0.05
+"""Difference of two forces' errors, of gravity, below which the smaller turn is the
+likelier: three degrees."""
+
+EXCHANGED_WITHIN = 0.05
+"""Distance from the angles of another position, of that between the two, up to which a
+position counts as held there."""
+
+MAX_MISCLOSURE_RAD = 0.3
+"""Largest closure that gyroscope errors can make, rad. A larger one means that outputs
+were clipped, or that the device was turned otherwise than its positions say."""
+
+MAX_WAY_CHI2 = 3.0
+"""Mean square of a row on the way, after a fit of all columns, above which a hand shook
+the device and the rows on the way are not used."""

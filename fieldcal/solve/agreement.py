@@ -19,24 +19,14 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
-from fieldcal.model import priors, thresholds
+from fieldcal.model import priors, thresholds, tolerances
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.solve.parameter_set import ParameterSet
 
-MAX_ROUNDED_LENGTH = 1e-9
-"""Length of a column, as a share of the longest, that is only rounding."""
-
 WITH_EQUATION = (Motion, Sensor)
 """Kinds of effects that have an equation."""
-
-MIN_SINGULAR_VALUE = 1e-6
-"""Relative singular value below which the windows do not determine a direction."""
-
-MAX_PREDICTION_VARIANCE = 1.0
-"""Variance, (m/s^2)^2, of a prediction above which no other window checks it: the wide
-priors of the estimated parameters dominate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,9 +155,9 @@ def _least_chi2(stated: Array, free: Array, y: Array) -> tuple[float, int]:
     a, b = white[:, :-1], white[:, -1]
     length = np.linalg.norm(a, axis=0)
     length = np.where(
-        length > MAX_ROUNDED_LENGTH * length.max(initial=0.0), length, np.inf
+        length > tolerances.ROUNDING * length.max(initial=0.0), length, np.inf
     )
-    x, _, rank, _ = np.linalg.lstsq(a / length, b, rcond=MIN_SINGULAR_VALUE)
+    x, _, rank, _ = np.linalg.lstsq(a / length, b, rcond=tolerances.UNDETERMINED)
     rest = b - a / length @ x
     return float(rest @ rest), int(rank)
 
@@ -205,7 +195,7 @@ class _MeasuredMeans:
         for i in np.flatnonzero(self.freely_rotated).tolist():
             out[i] = [self._force_direction(i) @ np.nan_to_num(out[i]), np.nan, np.nan]
         if unsure is not None and 0 in self.channels:
-            most = MAX_PREDICTION_VARIANCE * self.d.unit[0] ** 2
+            most = thresholds.MAX_PREDICTION_VARIANCE * self.d.unit[0] ** 2
             for i in range(len(out)):
                 n = self._directions(i)
                 if np.trace(n @ unsure[i] @ n.T) > most:

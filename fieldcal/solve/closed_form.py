@@ -25,6 +25,7 @@ import numpy as np
 
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import ACC, Array, Mask
+from fieldcal.model import thresholds
 from fieldcal.model.causes.planned import ACC_CALIBRATION
 from fieldcal.solve.observations import Observations
 
@@ -69,10 +70,6 @@ class ClosedFormEstimate:
         )
 
 
-MIN_FORCE_DIFFERENCE = 1e-4
-"""Least difference of specific force between the positions, as a share of gravity."""
-
-
 def two_position(
     observations: Observations, as_printed: bool = False
 ) -> ClosedFormEstimate:
@@ -98,8 +95,8 @@ def two_position(
         )
     g = observations.gravity
     f = printed_forces(observations) if as_printed else observations.forces
-    scaled = np.abs(f[0] - f[1]) > MIN_FORCE_DIFFERENCE * g
-    bare = (np.abs(f) < MIN_FORCE_DIFFERENCE * g).all(axis=0) & ~scaled
+    scaled = np.abs(f[0] - f[1]) > thresholds.MIN_FORCE_DIFFERENCE * g
+    bare = (np.abs(f) < thresholds.MIN_FORCE_DIFFERENCE * g).all(axis=0) & ~scaled
     if not scaled.any():
         raise NotObservable(
             f"{observations.positions[0].name} and {observations.positions[1].name} "

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Mask
+from fieldcal.model import tolerances
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.state import State
@@ -27,9 +28,6 @@ from fieldcal.solve.warm_scales import WARM_SCALE
 CHANGING = ("time", "temperature", "force and time", "flicker", WARM_SCALE)
 """Functions without physics whose value at the end belongs to the biases and scale
 factors there; functions of angles and forces have no zero."""
-
-DERIVATIVE_STEP = 1e-3
-"""d of (1), m/s^2 and rad/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +80,9 @@ def end_values(d: Dictionary, shown: Sequence[WeightedExplanation]) -> EndValues
     if not changing.any():
         return EndValues(slopes[0], slopes, sudden)
     for c in range(6):
-        step = DERIVATIVE_STEP * np.eye(6)[c]
+        step = tolerances.DERIVATIVE_STEP * np.eye(6)[c]
         up, down = (_end_outputs(d, changing, s * step) for s in (1.0, -1.0))
-        slopes[:, c] = (up - down) / (2 * DERIVATIVE_STEP)  # (1)
+        slopes[:, c] = (up - down) / (2 * tolerances.DERIVATIVE_STEP)  # (1)
     return EndValues(_end_outputs(d, changing, np.zeros(6)), slopes, sudden)
 
 

@@ -19,7 +19,7 @@ from itertools import combinations
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS
 from fieldcal.effects import catalogue
-from fieldcal.model import priors, thresholds
+from fieldcal.model import priors, thresholds, tolerances
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import (
@@ -33,9 +33,6 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import Effect, Motion, Scatter, Sensor
 from fieldcal.physics.experience import Experience
-
-MAX_SUBSET_PARAMETERS = 3
-"""Largest number of parameters of which subsets are taken as variants."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +194,7 @@ def _group_variants(d: Dictionary, group: Group) -> list[Group]:
     if not isinstance(effect, Motion | Sensor):
         raise TypeError(f"{group.cause} has no equation")
     whole = next(at for part, at in parameter_groups(d, effect) if part == group.part)
-    if isinstance(effect, Motion) or len(whole) > MAX_SUBSET_PARAMETERS:
+    if isinstance(effect, Motion) or len(whole) > tolerances.MAX_SUBSET_PARAMETERS:
         whole_group = replace(group, params=_in_axes_of(d, group))
         return groups_at_points(d, whole_group, [(group.shape, group.origin)])
     own = (group.shape, group.origin)

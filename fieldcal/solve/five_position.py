@@ -30,6 +30,7 @@ import numpy as np
 
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import ACC, Array
+from fieldcal.model import tolerances
 from fieldcal.solve.closed_form import ClosedFormEstimate
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import determined_parameters
@@ -37,9 +38,6 @@ from fieldcal.solve.rank import determined_parameters
 Found = dict[str, Array]
 
 RAD = np.pi / 180
-
-IMAGINARY_STEP = 1e-30
-"""Imaginary step of the derivatives; exact to the machine, since nothing cancels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,11 +129,15 @@ def _parameters_with_derivatives(
     c: Array, limits: Array, g: float, as_printed: bool
 ) -> tuple[tuple[str, ...], Array, Array]:
     """Parameters from all coefficients, and their derivatives by them."""
-    stepped = np.vstack([c + 0j, c + 1j * IMAGINARY_STEP * np.eye(len(c))]).T
+    stepped = np.vstack([c + 0j, c + 1j * tolerances.IMAGINARY_STEP * np.eye(len(c))]).T
     x, y, z = (stepped[i:j] for i, j in pairwise(limits))
     parameters = _parameters_of_axes(x, y, z, g, as_printed)
     table = np.stack(list(parameters.values()))
-    return tuple(parameters), table[:, 0].real, table[:, 1:].imag / IMAGINARY_STEP
+    return (
+        tuple(parameters),
+        table[:, 0].real,
+        table[:, 1:].imag / tolerances.IMAGINARY_STEP,
+    )
 
 
 def _parameters_of_axes(

@@ -23,9 +23,6 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.solve.parameter_set import ParameterSet
 
-VERTICAL = 1
-"""Index of the vertical in the columns of the Earth's rate; it points down."""
-
 
 @dataclass(frozen=True, slots=True)
 class VerticalEarthRate:
@@ -59,7 +56,7 @@ class VerticalEarthRate:
         """
         if parameter_set.earth < 0 or latitude is None:
             return None
-        column = np.array([parameter_set.earth + VERTICAL])
+        column = np.array([parameter_set.earth + 1])  # of the vertical, down
         group = Group(
             "earth", "vertical", column, np.array([EARTH_RATE]), fixed_size=1.0
         )

@@ -23,10 +23,8 @@ from fieldcal.core.positions import (
     table_rates,
 )
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Index, Mask
+from fieldcal.model import tolerances
 from fieldcal.windows import Average
-
-MIN_EIGENVALUE = 1e-6
-"""Least eigenvalue of a correlation matrix that is taken as known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +228,7 @@ def _regularised(covariance: Array) -> Array:
         if not (size > 0).all():
             continue
         least = np.linalg.eigvalsh(block / np.outer(size, size)).min()
-        if least < MIN_EIGENVALUE:
+        if least < tolerances.UNDETERMINED:
             out[three, three] = np.diag(size**2)
             out[:3, 3:] = out[3:, :3] = 0.0
     return out

@@ -1,9 +1,9 @@
 """Parameters that a design determines, and positions that determine the others.
 
 Columns are scaled to length one, so that the rank does not depend on units; directions
-whose singular value is below `RCOND` of the largest are not determined, nor is a
-parameter with a component along one. Source: G. H. Golub and C. F. Van Loan, Matrix
-Computations, 5.5.
+whose singular value is below `tolerances.UNDETERMINED` of the largest are not
+determined, nor is a parameter with a component along one. Source: G. H. Golub and C. F.
+Van Loan, Matrix Computations, 5.5.
 """
 
 from __future__ import annotations
@@ -14,20 +14,9 @@ import numpy as np
 
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Mask
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.causes.planned import design_matrix
 from fieldcal.solve.observations import Observations
-
-RCOND = 1e-7
-"""Ratio of singular values below which a direction counts as not determined."""
-
-MAX_ROUNDED_LENGTH = 1e-12
-"""Length of a column, as a share of the longest, that counts as zero."""
-
-MIN_NULL_SHARE = 1e-4
-"""Share of a null direction above which a parameter counts as not determined."""
-
-MAX_POSITIONS = 4
-"""Largest number of proposed positions; beyond it another procedure is needed."""
 
 PROPOSED_POSITIONS = tuple(
     Position.deg(a, b)
@@ -41,10 +30,14 @@ def determined_parameters(rows: Array) -> tuple[Mask, int]:
     """Which parameters (p,) a design (m, p) determines, and its rank."""
     scale = np.linalg.norm(rows, axis=0)
     # sin(180°) is not quite zero: such a column contains only rounding errors
-    scale = np.where(scale > MAX_ROUNDED_LENGTH * scale.max(initial=0.0), scale, np.inf)
+    scale = np.where(
+        scale > tolerances.ROUNDING * scale.max(initial=0.0), scale, np.inf
+    )
     _, s, vt = np.linalg.svd(rows / scale, full_matrices=True)
-    rank = int((s > RCOND * max(float(s.max(initial=0.0)), 1e-300)).sum())
-    known: Mask = (np.abs(vt[rank:]) < MIN_NULL_SHARE).all(axis=0)
+    rank = int(
+        (s > tolerances.UNDETERMINED * max(float(s.max(initial=0.0)), 1e-300)).sum()
+    )
+    known: Mask = (np.abs(vt[rank:]) < thresholds.MIN_NULL_SHARE).all(axis=0)
     return known, rank
 
 
@@ -72,7 +65,7 @@ def positions_to_add(
     everything = rows(taken).shape[-1]
     have = count(taken)
     while have[0] < everything:
-        if len(extra) == MAX_POSITIONS:
+        if len(extra) == thresholds.MAX_PROPOSED_POSITIONS:
             return []
         ranks = [count([*taken, *extra, c]) for c in candidates]
         best = max(range(len(ranks)), key=ranks.__getitem__)

@@ -33,9 +33,6 @@ from fieldcal.solve.rank import ladder_remedy
 EarthRateModel = Literal["stated", "another", "none"]
 """Earth's rate in the gyroscopes: of the stated latitude, of another one, or none."""
 
-COARSER_GRADE_CHANCE = 0.5
-"""Probability from which an error is taken to be as large as in the coarser grade."""
-
 
 class SessionFit:
     """Fits of several parameter sets to the rows of one session.
@@ -117,7 +114,7 @@ class SessionFit:
         if (stated := self.options.at_best) is None:
             return estimate
         chances = estimate.coarser_probabilities(stated)
-        likely = [k for k, p in chances.items() if p < COARSER_GRADE_CHANCE]
+        likely = [k for k, p in chances.items() if p < thresholds.NAMED]
         finer = {k: getattr(stated, k) for k in likely}
         if not finer:
             return estimate

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Mask
-from fieldcal.model import thresholds
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.posterior.mixture import Mixture
@@ -23,14 +23,6 @@ from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve.averaging import mixture_with_causes
 from fieldcal.solve.parameter_set import ParameterSet
-
-MAX_TURN_INTEGRATIONS, MIN_SCALE_CHANGE = 6, 0.01
-"""Largest number of integrations of the turns, and the change of a scale factor from
-which they are integrated again. The error of linearisation is the square of the change:
-1e-4, and 1e-8 after the last integration."""
-
-BAD_WINDOW_NOISE = 1e5
-"""Factor on the noise of a bad window that must not influence the state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +87,7 @@ def _without_windows(rows: Rows, parameter_set: ParameterSet, bad: Mask) -> Rows
     """Rows in which bad windows (p,) have no weight."""
     left = np.isin(rows.x.position, parameter_set.window_positions[bad])
     return replace(
-        rows, sd=np.where(left[:, None], BAD_WINDOW_NOISE * rows.sd, rows.sd)
+        rows, sd=np.where(left[:, None], tolerances.NO_WEIGHT_NOISE * rows.sd, rows.sd)
     )
 
 
@@ -113,12 +105,12 @@ def _settled_state(
     nominal = np.append(state.scale[:3], fit.nominal.scale[3:])
     state = replace(state, scale=nominal)
     state, values = _follow_turns_first(fit, parameter_set, state, values)
-    for again in range(MAX_TURN_INTEGRATIONS):
+    for again in range(tolerances.MAX_TURN_INTEGRATIONS):
         if again:
             fit.follow_turns(state, values)
         before = state.scale
         state, values, _ = fit.settle(state, values, parameter_set.members)
-        if np.abs(state.scale / before - 1).max() < MIN_SCALE_CHANGE:
+        if np.abs(state.scale / before - 1).max() < tolerances.MIN_SCALE_CHANGE:
             break
     return state, values
 

@@ -13,22 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.model import tolerances
 from fieldcal.model.evidence.eliminated import evidence_gains
 from fieldcal.model.evidence.sets import Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
 from fieldcal.solve.explanations import WeightedExplanation, has_equation
-
-REPRESENTATIVE_POINTS = 24
-"""Number of variants that represent all variants of a certain explanation; it falls in
-proportion to the probability of the explanation."""
-
-POINT_OFFSET = 1e-6
-"""Offset of points. With variants that mirror each other, a point may lie just between
-two of them, and rounding would decide which one is taken."""
-
-PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
-"""Their square roots spread points evenly over the causes beyond the first; where there
-are more causes, over several of them alike."""
 
 
 def variants(
@@ -43,7 +32,8 @@ def variants(
     each += [_with_and_without(sets, whole, m) for m in explanation.possible_members]
     share: dict[tuple[Member, ...], float] = {}
     points = spread_points(
-        len(each), max(1, round(REPRESENTATIVE_POINTS * explanation.probability))
+        len(each),
+        max(1, round(tolerances.REPRESENTATIVE_POINTS * explanation.probability)),
     )
     for at in points:
         pairs = zip(at, each, strict=True)
@@ -59,14 +49,16 @@ def choice_at(weight: Array, u: float) -> int:
     >>> choice_at(np.array([0.3, 0.2, 0.2, 0.3]), 0.5)
     1
     """
-    return int(np.searchsorted(np.cumsum(weight)[:-1], u - POINT_OFFSET))
+    return int(
+        np.searchsorted(np.cumsum(weight)[:-1], u - tolerances.ACCUMULATED_ROUNDING)
+    )
 
 
-def spread_points(count: int, points: int = REPRESENTATIVE_POINTS) -> Array:
+def spread_points(count: int, points: int = tolerances.REPRESENTATIVE_POINTS) -> Array:
     """Points spread evenly over the unit cube, (points, count)."""
     if not count:
         return np.full((1, 0), 0.5)
-    step = np.array([1 / points, *np.resize(np.sqrt(PRIMES), count - 1)])
+    step = np.array([1 / points, *np.resize(np.sqrt(tolerances.PRIMES), count - 1)])
     out: Array = (np.arange(points)[:, None] * step + 0.5 / points) % 1.0
     return out
 

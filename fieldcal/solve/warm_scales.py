@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import ACC, CHANNELS, Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.basis import Course, General, RowView
 from fieldcal.model.causes.cause import Cause, Group
@@ -24,7 +24,7 @@ from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import BiasChange
 
-ACC_OUTPUTS = 3
+ACC_OUTPUTS = len(CHANNELS[ACC])
 """Number of outputs of accelerometers; they come first."""
 
 WARM_SCALE = "warm_scale"

@@ -10,14 +10,13 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array
 from fieldcal.core.sentences import degrees_of_freedom, join_words
-from fieldcal.model import thresholds
-from fieldcal.model.turns.motion import MAX_TURN_S
+from fieldcal.model import detections, thresholds
 
 NO_DOF = "no degree of freedom is left to check the fit: add a verification position"
 
 RECORD_TURNS = (
-    f"record the turns between the positions, each within {MAX_TURN_S:g} s and without"
-    " a gap"
+    "record the turns between the positions, each within"
+    f" {detections.MAX_TURN_S:g} s and without a gap"
 )
 """Remedy where no turn could be followed, which may have been recorded."""
 

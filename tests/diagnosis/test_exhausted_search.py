@@ -14,8 +14,9 @@ from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.search.selection import MAX_CAUSES, is_exhausted
+from fieldcal.model.search.selection import is_exhausted
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile
 
@@ -43,7 +44,7 @@ def test_windows_full_of_turns_are_no_sum_of_effects(
     diagnosis = make_diagnosis(session.block, explanation)
     assert explanation.inferred.exhausted == bool(late)
     assert (diagnosis.verdict == "unexplained") == bool(late)
-    told = f"{MAX_CAUSES} causes together do not explain it"
+    told = f"{thresholds.MAX_CAUSES} causes together do not explain it"
     assert (told in " ".join(diagnosis.warnings)) == bool(late)
     # faults of samples were found before the search
     faults = explanation.prepared.checked.ids
@@ -55,5 +56,5 @@ def test_a_search_ends_at_as_many_causes() -> None:
     def of(count: int) -> Set:
         return cast(Set, SimpleNamespace(members=(None,) * count))
 
-    assert not is_exhausted(of(MAX_CAUSES - 1))
-    assert is_exhausted(of(MAX_CAUSES))
+    assert not is_exhausted(of(thresholds.MAX_CAUSES - 1))
+    assert is_exhausted(of(thresholds.MAX_CAUSES))

@@ -8,10 +8,10 @@ from observed import BIAS, SCALE, G, observe, outputs
 
 from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
 from fieldcal.model.causes.planned import design_matrix, parameters
 from fieldcal.solve import solve
 from fieldcal.solve.rank import (
-    MAX_POSITIONS,
     PROPOSED_POSITIONS,
     determined_parameters,
     ladder_remedy,
@@ -58,7 +58,7 @@ def test_what_is_proposed_is_enough_and_none_of_it_is_too_much(
         return design_matrix(TILTED, places, G)
 
     extra = positions_to_add(lambda p: rows(tuple(p)), taken, PROPOSED_POSITIONS)
-    assert 0 < len(extra) <= MAX_POSITIONS
+    assert 0 < len(extra) <= thresholds.MAX_PROPOSED_POSITIONS
     for left in [None, *extra]:
         kept = [p for p in extra if p is not left]
         table = rows((*taken, *kept)).reshape(-1, len(TILTED))
@@ -78,7 +78,10 @@ def test_nothing_is_proposed_where_nothing_is_missing_or_nothing_helps() -> None
     assert positions_to_add(rows, TWO_POSITIONS, PROPOSED_POSITIONS) == []
 
 
-@pytest.mark.parametrize("missing", [MAX_POSITIONS, MAX_POSITIONS + 1])
+@pytest.mark.parametrize(
+    "missing",
+    [thresholds.MAX_PROPOSED_POSITIONS, thresholds.MAX_PROPOSED_POSITIONS + 1],
+)
 def test_no_more_than_four_positions_are_proposed(missing: int) -> None:
     """Each position determines one parameter, that of its own number."""
     numbered = [Position(str(n)) for n in range(8)]

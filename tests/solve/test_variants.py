@@ -9,9 +9,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from fieldcal.model import tolerances
 from fieldcal.solve import variants
 from fieldcal.solve.explanations import WeightedExplanation
-from fieldcal.solve.variants import REPRESENTATIVE_POINTS, choice_at, spread_points
+from fieldcal.solve.variants import choice_at, spread_points
 
 
 def test_rounding_does_not_decide_between_variants_that_mirror_one_another() -> None:
@@ -27,18 +28,18 @@ def test_rounding_does_not_decide_between_variants_that_mirror_one_another() -> 
 def test_each_is_reached_as_often_as_it_is_likely(weight: list[float]) -> None:
     (points,) = spread_points(1).T
     at = [choice_at(np.array(weight), float(u)) for u in points]
-    share = np.bincount(at, minlength=len(weight)) / REPRESENTATIVE_POINTS
+    share = np.bincount(at, minlength=len(weight)) / tolerances.REPRESENTATIVE_POINTS
     np.testing.assert_allclose(share, weight, atol=1e-12)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 20, 25])
 def test_points_spread_evenly_over_every_cause(count: int) -> None:
     points = spread_points(count)
-    assert points.shape == (REPRESENTATIVE_POINTS, count)
+    assert points.shape == (tolerances.REPRESENTATIVE_POINTS, count)
     assert ((points >= 0) & (points < 1)).all()
     for column in points.T:
         gaps = np.diff(np.concatenate([[0.0], np.sort(column), [1.0]]))
-        assert gaps.max() < 5 / REPRESENTATIVE_POINTS
+        assert gaps.max() < 5 / tolerances.REPRESENTATIVE_POINTS
         assert abs(column.mean() - 0.5) < 0.12
 
 
@@ -87,7 +88,7 @@ def test_variants_are_as_likely_as_their_choices_together(
     }.items():  # fmt: skip
         assert found[members] == pytest.approx(expected, abs=2.01 / 24)
     # multiples of a point's share
-    shares = np.array(list(found.values())) * REPRESENTATIVE_POINTS
+    shares = np.array(list(found.values())) * tolerances.REPRESENTATIVE_POINTS
     np.testing.assert_allclose(shares, shares.round(), atol=1e-9)
 
 

@@ -29,8 +29,9 @@ from fieldcal.against.wording import paragraph
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Block
 from fieldcal.diagnosis.result import Quantity
+from fieldcal.model import detections
 from fieldcal.model.evidence.eliminated import Eliminated
-from fieldcal.model.rows.reference import MIN_CHANNEL_SAMPLES, Reference
+from fieldcal.model.rows.reference import Reference
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.search.set_at_instability import with_typical_calibration
 from fieldcal.physics.recording import grids_of
@@ -93,7 +94,7 @@ def compare_in_motion(
 def _check_samples(name: str, block: Block) -> None:
     """Refuse a recording that is too short to show any motion."""
     known = int(np.isfinite(block.six).sum(axis=0).max())
-    if known < MIN_CHANNEL_SAMPLES:
+    if known < detections.MIN_SAMPLES:
         raise InputError(
             f"{name}: its channels have {known} sample{'s' * (known != 1)} at most:"
             " compare some seconds of a motion"

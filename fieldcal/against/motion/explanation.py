@@ -15,7 +15,6 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.model.search.inference import InferenceResult
-from fieldcal.model.search.variations import ALTERNATIVE_MARGIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +72,8 @@ class MotionExplanation:
         rivals = {
             one.names: one
             for one in likeliest
-            if one.names - self.names and self._behind(one) < ALTERNATIVE_MARGIN
+            if one.names - self.names
+            and self._behind(one) < thresholds.ALTERNATIVE_LOG_DISTANCE
         }
         return replace(self, rivals=tuple(rivals.values()))
 

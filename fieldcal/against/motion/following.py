@@ -22,6 +22,7 @@ from fieldcal.against.motion.explanation import (
 from fieldcal.against.motion.fit import MotionFit, lag_of
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
+from fieldcal.model import thresholds
 from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Posterior
@@ -34,7 +35,6 @@ from fieldcal.model.rows.motion import (
 )
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.search.inference import InferenceResult
-from fieldcal.model.search.variations import ALTERNATIVE_MARGIN
 from fieldcal.model.state import State
 from fieldcal.model.system.motion_rows import MotionSystem
 from fieldcal.physics.lag import Lag
@@ -179,7 +179,11 @@ def _likely_starts(fit: MotionFit, dictionary: MotionDictionary) -> list[_Start]
             if lag_of(every[i]) != Lag() or other.evidence((*members, every[i])) > own
         ]
     most = max(one.evidence for one in tried)
-    return [one for one in tried if one.evidence > most - ALTERNATIVE_MARGIN]
+    return [
+        one
+        for one in tried
+        if one.evidence > most - thresholds.ALTERNATIVE_LOG_DISTANCE
+    ]
 
 
 def _without_idle_lags(
@@ -195,7 +199,7 @@ def _without_idle_lags(
         return fit, members
     most = fit.evidence(members)
     loss = [most - fit.evidence(_without(members, m)) for m in lags]
-    if max(loss) > LAG_ORDER**2 * ALTERNATIVE_MARGIN:
+    if max(loss) > LAG_ORDER**2 * thresholds.ALTERNATIVE_LOG_DISTANCE:
         lags.pop(loss.index(max(loss)))  # without it the others would have to grow
     for member in lags:
         lean, others = fit.copy(), _without(members, member)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.causes.cause import MIN_WINDOWS
+from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 
 MAX_SAME_FORCE_COSINE = np.cos(np.deg2rad(10.0))
@@ -20,7 +20,7 @@ def holds_positions(block: Block, about: Description) -> bool:
     """Whether a recording holds enough different positions."""
     windows = [w for w in about.windows if w is not None]
     if any(p.alpha is not None or p.rate or p.speed for p in about.positions):
-        return len(windows) >= MIN_WINDOWS
+        return len(windows) >= thresholds.MIN_ALIKE
     seen: list[Array] = []
     for start, end in windows:
         acc = block.between(start, end).acc
@@ -30,4 +30,4 @@ def holds_positions(block: Block, about: Description) -> bool:
         up = force / max(float(np.linalg.norm(force)), 1e-12)
         if all(up @ other < MAX_SAME_FORCE_COSINE for other in seen):
             seen.append(up)
-    return len(seen) >= MIN_WINDOWS
+    return len(seen) >= thresholds.MIN_ALIKE

@@ -11,10 +11,8 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.result import Quality
+from fieldcal.model import resolutions
 from fieldcal.model.rows.averages import Rows
-
-PART_ENDS = (0.0, 0.1, 0.25, 0.5, 1.0)
-"""Ends of the parts of a window over which residuals are averaged."""
 
 
 def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, Index]:
@@ -30,7 +28,9 @@ def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, Index]:
     means, sds, position = [], [], []
     for p in np.unique(rows.x.position):
         at = np.flatnonzero(rows.x.position == p)
-        cuts = np.unique(np.round(np.array(PART_ENDS) * len(at)).astype(int))
+        cuts = np.unique(
+            np.round(np.array(resolutions.PART_ENDS) * len(at)).astype(int)
+        )
         for a, b in zip(cuts[:-1], cuts[1:], strict=True):
             part = at[a:b]
             use = np.isfinite(residual[part]) & rows.used[part]

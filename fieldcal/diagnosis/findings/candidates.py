@@ -11,21 +11,11 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.agreement import rms_over_parts
 from fieldcal.diagnosis.result import Candidate, FoundEffect
 from fieldcal.effects import catalogue
-from fieldcal.model import thresholds
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import held_out_residuals
 from fieldcal.model.search.offers import Offer
 from fieldcal.physics.effect import Scatter
-
-LARGEST_LOG_ODDS = 40.0
-"""Largest log odds that are stated."""
-
-LEAST_LOSS = 1e-6
-"""Least rise of the held-out rms, of all of it, that counts: a candidate whose most
-probable size is none predicts as well as nothing does, but for rounding errors."""
-
-PREDICTED_LOSERS = 1
-"""Rejected effects whose predictions are calculated: each needs a fit per position."""
 
 
 def tried_candidates(
@@ -40,7 +30,7 @@ def tried_candidates(
     taken = {f.id: f for f in found}
     rows = int(explanation.rows.used.sum())
     losers = (i for i in alone if i in catalogue() and i not in taken)
-    followed = list(losers)[:PREDICTED_LOSERS]
+    followed = list(losers)[: tolerances.PREDICTED_LOSERS]
     out = []
     for id_ in dict.fromkeys(c.name for c in explanation.dictionary.causes):
         effect = catalogue().get(id_)
@@ -57,7 +47,7 @@ def tried_candidates(
             why = _reason_rejected(id_, explanation, offer, beside.get(id_))
         if accepted is None and offer is not None and id_ in followed:
             gain = _held_out_gain_alone(explanation, offers.accept(nothing, offer))
-            if gain < -LEAST_LOSS:
+            if gain < -tolerances.ACCUMULATED_ROUNDING:
                 why = f"what it was not fitted to it predicts worse; {why}"
         bic = delta - width * float(np.log(rows))
         sure, chosen = posterior.probability([id_]), accepted is not None
@@ -125,9 +115,11 @@ def _odds(gain: float) -> str:
     ('1 to 1', '1 to 20', 'below 1 to 2e+17')
     """
     if gain > 0:
-        more = np.exp(min(gain, LARGEST_LOG_ODDS))
-        return f"{'above ' if gain > LARGEST_LOG_ODDS else ''}{more:.2g} to 1"
-    more = np.exp(min(-gain, LARGEST_LOG_ODDS))
-    if gain < -LARGEST_LOG_ODDS:
+        more = np.exp(min(gain, thresholds.LARGEST_LOG_ODDS))
+        return (
+            f"{'above ' if gain > thresholds.LARGEST_LOG_ODDS else ''}{more:.2g} to 1"
+        )
+    more = np.exp(min(-gain, thresholds.LARGEST_LOG_ODDS))
+    if gain < -thresholds.LARGEST_LOG_ODDS:
         return f"below 1 to {more:.0e}"
     return f"1 to {more:.2g}"

@@ -23,10 +23,6 @@ JOINTS = ("α", "β")
 Places = tuple[int, ...]
 """Positions, from 0."""
 
-EXCHANGED_WITHIN = 0.05
-"""Largest distance from the angles of another position, as a part of that between the
-two, at which a position counts as held there."""
-
 AngleErrors = tuple[tuple[str, Quantity], ...]
 """Joints, each with the error of its angle, deg."""
 
@@ -105,7 +101,7 @@ def exchanged_positions(
 def _is_at(held: Array, elsewhere: Array, stated: Array) -> bool:
     """Whether angles are those stated elsewhere, and not those stated, rad."""
     off, apart = wrap_angle(held - elsewhere), wrap_angle(held - stated)
-    return bool(np.abs(off).max() < EXCHANGED_WITHIN * np.abs(apart).max())
+    return bool(np.abs(off).max() < thresholds.EXCHANGED_WITHIN * np.abs(apart).max())
 
 
 def single_errors(explanation: Explanation, member: Member) -> list[Group]:

@@ -16,21 +16,10 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
-from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
-from fieldcal.model import thresholds
+from fieldcal.model import detections, resolutions, thresholds, tolerances
 from fieldcal.physics.effect import Line
 from fieldcal.physics.experience import Experience
-
-MIN_HELD_OUT_WINDOWS, STRETCHES_PER_WINDOW, MAX_FOLDS = 3, 5, 12
-"""Number of windows below which stretches of them are held out in place of windows;
-stretches of each window; parts of the recording that are held out in turn."""
-
-SLOPE_PERIODS = 30.0
-"""Periods in a window up to which a slope takes a part of a line: 0.07 % here."""
-
-FREQUENCIES_AT_ONCE = 256
-"""Frequencies tried together: all of a long recording would take much memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +85,11 @@ class LineRemainder:
 
 def tune_line(pieces: WindowSamples, effect: Line, moments: Moments) -> SpectralLine:
     """Fit an effect at the frequency near that of the moments that explains most."""
-    shortest = pieces.shortest_samples(PERIODOGRAM_SAMPLES) / pieces.rate
+    shortest = pieces.shortest_samples(resolutions.PERIODOGRAM_SAMPLES) / pieces.rate
     step = 0.2 / max(float(np.ptp(moments.middle)), shortest)
     offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
     tone = _line_at_best_frequency(pieces, effect, moments, offsets, step, 3)
-    if not pieces.usable or tone.hz * shortest > SLOPE_PERIODS:
+    if not pieces.usable or tone.hz * shortest > detections.SLOPE_PERIODS:
         return tone
     whole = pieces.with_whole_line(tone.hz, tone.amplitudes(pieces.x))
     again = moments_of(whole, tone.hz)
@@ -130,10 +119,14 @@ def measured_amplitudes(
 
 def line_remainder(pieces: WindowSamples, tone: SpectralLine) -> LineRemainder:
     """Mean squares that are left of a line, after its fit and after its prediction."""
-    many = len(pieces.samples) >= MIN_HELD_OUT_WINDOWS
-    moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES_PER_WINDOW)
+    many = len(pieces.samples) >= thresholds.MIN_ALIKE
+    moments = moments_of(
+        pieces, tone.hz, 1 if many else resolutions.LINE_STRETCHES_PER_WINDOW
+    )
     groups = np.arange(len(moments.counts))
-    fold = groups % (MAX_FOLDS if many else STRETCHES_PER_WINDOW)
+    fold = groups % (
+        tolerances.MAX_FOLDS if many else resolutions.LINE_STRETCHES_PER_WINDOW
+    )
     measured = moments.amplitudes(np.zeros(1))[0]
     fitted = tone.amplitudes(pieces.x)[moments.window]
     ahead = measured.copy()
@@ -179,7 +172,9 @@ def _line_at_best_frequency(
     rounds: int,
 ) -> SpectralLine:
     for _ in range(rounds):
-        some = np.array_split(offsets, -(-len(offsets) // FREQUENCIES_AT_ONCE))
+        some = np.array_split(
+            offsets, -(-len(offsets) // tolerances.FREQUENCIES_AT_ONCE)
+        )
         chi2 = np.concatenate(
             [_fit_causes(pieces, effect, moments, each)[2] for each in some]
         )

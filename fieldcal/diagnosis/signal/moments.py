@@ -15,12 +15,8 @@ from itertools import pairwise
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
-from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
-
-PARTS_PER_WINDOW, MIN_PART_SAMPLES = 15, 4
-"""Parts per window (or per length of a periodogram) whose sums are kept, so that the
-frequency can be shifted within a periodogram's resolution; fewest samples in a part."""
+from fieldcal.model import resolutions
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +65,10 @@ def moments_of(pieces: WindowSamples, near: float, stretches: int = 1) -> Moment
     counts: list[float] = []
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
         for first, last in pairwise(_part_bounds(0, len(t), stretches)):
-            most = PARTS_PER_WINDOW * max((last - first) // PERIODOGRAM_SAMPLES, 1)
-            parts = min(most, max((last - first) // MIN_PART_SAMPLES, 1))
+            most = resolutions.PARTS_PER_WINDOW * max(
+                (last - first) // resolutions.PERIODOGRAM_SAMPLES, 1
+            )
+            parts = min(most, max((last - first) // resolutions.MIN_PART_SAMPLES, 1))
             for a, b in pairwise(_part_bounds(first, last, parts)):
                 turned = 2 * np.pi * near * t[a:b]
                 real, imaginary = (

@@ -9,19 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.model import detections
 from fieldcal.physics.recording import medians
-
-FLOOR_NEIGHBOURS = 40
-"""Neighbours that give the floor, to either side."""
-
-NEAREST_NEIGHBOUR, FURTHEST_NEIGHBOUR = 5, 12
-"""Nearest and furthest neighbours beyond the taper's reach; they give the slope."""
-
-STEEP_RATIO = 4.0
-"""Multiple of the floor above which these neighbours replace it."""
-
-SLOPE_POWER_SHARE = 0.3
-"""Part of the power at a frequency that is below it on a slope; beside a line, less."""
 
 
 def noise_level(power: Array, count: int, known: Array | None = None) -> Array:
@@ -37,7 +26,7 @@ def noise_level(power: Array, count: int, known: Array | None = None) -> Array:
 
 def _median_floor(power: Array) -> Array:
     """Running median (m,) of the power, interpolated between stretches."""
-    parts = max(1, len(power) // (2 * FLOOR_NEIGHBOURS))
+    parts = max(1, len(power) // (2 * detections.FLOOR_NEIGHBOURS))
     each = len(power) // parts
     level = medians(power[: parts * each].reshape(parts, each))
     middle = (np.arange(parts) + 0.5) * each
@@ -54,18 +43,25 @@ def _floor_on_slope(power: Array, floor: Array) -> Array:
     n = len(power)
     # sums up to and including each; beyond the ends there is nothing to add
     totals = np.pad(
-        np.cumsum(power), (FURTHEST_NEIGHBOUR + 1, FURTHEST_NEIGHBOUR + 1), "edge"
+        np.cumsum(power),
+        (detections.FURTHEST_NEIGHBOUR + 1, detections.FURTHEST_NEIGHBOUR + 1),
+        "edge",
     )
-    totals[: FURTHEST_NEIGHBOUR + 1] = 0.0
+    totals[: detections.FURTHEST_NEIGHBOUR + 1] = 0.0
     counts = np.pad(
-        np.arange(n + 1), (FURTHEST_NEIGHBOUR, FURTHEST_NEIGHBOUR + 1), "edge"
+        np.arange(n + 1),
+        (detections.FURTHEST_NEIGHBOUR, detections.FURTHEST_NEIGHBOUR + 1),
+        "edge",
     )
     sides = []
     for low, high in (
-        (-FURTHEST_NEIGHBOUR, -NEAREST_NEIGHBOUR),
-        (NEAREST_NEIGHBOUR + 1, FURTHEST_NEIGHBOUR + 1),
+        (-detections.FURTHEST_NEIGHBOUR, -detections.NEAREST_NEIGHBOUR),
+        (detections.NEAREST_NEIGHBOUR + 1, detections.FURTHEST_NEIGHBOUR + 1),
     ):
-        first, last = FURTHEST_NEIGHBOUR + low, FURTHEST_NEIGHBOUR + high
+        first, last = (
+            detections.FURTHEST_NEIGHBOUR + low,
+            detections.FURTHEST_NEIGHBOUR + high,
+        )
         count = counts[last : last + n] - counts[first : first + n]
         mean = (totals[last : last + n] - totals[first : first + n]) / np.maximum(
             count, 1
@@ -75,5 +71,7 @@ def _floor_on_slope(power: Array, floor: Array) -> Array:
     # at either end of the spectrum only one side has neighbours
     beside = np.where(np.isfinite(above), np.maximum(below, above), below)
     beside = np.where(np.isfinite(below), beside, above)
-    falls = (beside > STEEP_RATIO * floor) & (below > SLOPE_POWER_SHARE * power)
+    falls = (beside > detections.STEEP_RATIO * floor) & (
+        below > detections.SLOPE_POWER_SHARE * power
+    )
     return np.where(falls, np.minimum(beside, power), floor)

@@ -15,24 +15,9 @@ from operator import itemgetter
 import numpy as np
 
 from fieldcal.core.samples import Array, Mask
-from fieldcal.diagnosis.signal.noise_level import FLOOR_NEIGHBOURS, FURTHEST_NEIGHBOUR
-from fieldcal.diagnosis.signal.periodogram import (
-    LINE_DISTANCE_CYCLES,
-    PERIODOGRAM_SAMPLES,
-    Spectrum,
-    noise_near,
-)
+from fieldcal.diagnosis.signal.periodogram import Spectrum, noise_near
 from fieldcal.diagnosis.signal.pieces import WindowSamples
-from fieldcal.model import thresholds
-
-MIN_CYCLES = 2.5
-"""Fewest cycles in a window that make a line."""
-
-PEAK_EDGE_RATIO = 2.0
-"""Times the floor down to which the power about a peak belongs to it."""
-
-SEARCHED_GROUPS = 16
-"""Groups of channels in which a recording is searched for a peak, about."""
+from fieldcal.model import detections, resolutions, thresholds
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +49,11 @@ def highest_peak(
     Spectra of one phase throughout come first: tremor is louder, but is no line. Peaks
     close to those in `taken` are ignored.
     """
-    shortest = pieces.shortest_samples(PERIODOGRAM_SAMPLES) / pieces.rate
-    low, reach = max(0.05, MIN_CYCLES / shortest), LINE_DISTANCE_CYCLES / shortest
+    shortest = pieces.shortest_samples(resolutions.PERIODOGRAM_SAMPLES) / pieces.rate
+    low, reach = (
+        max(0.05, detections.MIN_CYCLES / shortest),
+        detections.LINE_DISTANCE_CYCLES / shortest,
+    )
     one_phase = [s for s in spectra if s.count == 1]
     peak = _significant(one_phase, low, reach, taken)
     windows, rejected = [s for s in spectra if s.count > 1], list[Peak]()
@@ -130,12 +118,12 @@ def _highest_in_spectrum(
     for channels in spectrum.channel_groups:
         occupied = [*taken, *(p for p in rejected if set(p.channels) & set(channels))]
         free = _away_from(hz, occupied, reach)
-        if free.sum() < 4 * FLOOR_NEIGHBOURS:
+        if free.sum() < 4 * detections.FLOOR_NEIGHBOURS:
             continue
         total = np.sum([stands[c] for c in channels], axis=0)
         at = int(np.argmax(np.where(free, total, 0.0)))
         odds = _log_gamma_tail(float(total[at]), count * len(channels))
-        odds += np.log(SEARCHED_GROUPS * len(total))
+        odds += np.log(detections.SEARCHED_GROUPS * len(total))
         if best is None or odds < best[0]:
             peak = _peak_at(hz, total / (count * len(channels)), at)
             best = odds, replace(peak, channels=channels)
@@ -156,8 +144,12 @@ def _peak_at(hz: Array, power: Array, at: int) -> Peak:
     It reaches as far as the smoothed power stays above the floor: a machine whose speed
     varies makes a broad peak, which is no line.
     """
-    kernel = np.ones(2 * FURTHEST_NEIGHBOUR + 1) / (2 * FURTHEST_NEIGHBOUR + 1)
-    low = np.flatnonzero(np.convolve(power, kernel, "same") < PEAK_EDGE_RATIO)
+    kernel = np.ones(2 * detections.FURTHEST_NEIGHBOUR + 1) / (
+        2 * detections.FURTHEST_NEIGHBOUR + 1
+    )
+    low = np.flatnonzero(
+        np.convolve(power, kernel, "same") < detections.PEAK_EDGE_RATIO
+    )
     below, above = low[low < at], low[low > at]
     first = int(below[-1]) if len(below) else 0
     last = int(above[0]) if len(above) else len(hz) - 1

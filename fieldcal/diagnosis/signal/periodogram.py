@@ -23,43 +23,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Mask
-from fieldcal.diagnosis.signal.noise_level import (
-    FURTHEST_NEIGHBOUR,
-    NEAREST_NEIGHBOUR,
-    noise_level,
-)
+from fieldcal.diagnosis.signal.noise_level import noise_level
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
-
-PERIODOGRAM_SAMPLES = 32_768
-"""Samples of one periodogram."""
-
-LEVEL_PERIODOGRAMS = 200
-"""Periodograms whose mean gives the level of noise, to 7 %."""
-
-LEVEL_SIGMAS = 3.0
-"""Standard deviations above the level of noise from which (1) replaces it."""
-
-SHORT_STEP, SHORT_STEP_SHARE = 0.5, 0.01
-"""Time step, in sampling periods, below which a step cannot be the device's own, and
-part of the steps that are so short where times are those of arrival."""
-
-GRID_PER_SAMPLE = 4
-"""Grid points per sampling period for samples at uneven times: an error of an eighth of
-a period costs 3 % of the power at most below 0.4 of the rate, one of a half a third."""
-
-LINE_DISTANCE_CYCLES = 2.0
-"""Distance between two lines, in cycles of the shortest window."""
+from fieldcal.model import detections, resolutions, tolerances
 
 CHANNEL_GROUPS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
 """Channels that are searched together for a line of one phase."""
-
-MAX_COHERENT_SAMPLES = 1 << 18
-"""Most samples of a recording that is searched for lines of one phase throughout."""
-
-
-MAX_COHERENT_PERIODS = 1 << 20
-"""Longest such recording, in sampling periods: over longer pauses no clock keeps the
-phase of a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +88,8 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     out = [windows]
     lasts = pieces.times[-1][-1] - pieces.times[0][0]
     long = (
-        lasts * pieces.rate > MAX_COHERENT_PERIODS
-        or sum(map(len, pieces.samples)) > MAX_COHERENT_SAMPLES
+        lasts * pieces.rate > detections.MAX_COHERENT_PERIODS
+        or sum(map(len, pieces.samples)) > tolerances.MAX_COHERENT_SAMPLES
     )
     if long or any(_in_bursts(t, pieces.rate) for t in pieces.times):
         return out
@@ -132,7 +101,7 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     # electronics may disturb one output alone, motion of the base disturbs a triad
     groups = [(*windows.channel_groups, *triads), tuple(triads)]
     variance = _neighbour_variance(windows, pieces)
-    sure = 1 + LEVEL_SIGMAS / np.sqrt(max(len(pieces.samples) - 1, 1))
+    sure = 1 + detections.LEVEL_SIGMAS / np.sqrt(max(len(pieces.samples) - 1, 1))
     for frame, channel_groups in zip(frames, groups, strict=False):
         power, tremor, hz = _coherent_power(pieces, frame)
         noise = np.array([np.interp(hz, windows.hz, row) for row in variance])
@@ -144,11 +113,11 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
 
 def window_spectrum(pieces: WindowSamples) -> Spectrum:
     """Power summed over windows, channel by channel."""
-    length = min(PERIODOGRAM_SAMPLES, max(map(len, pieces.samples)))
+    length = min(resolutions.PERIODOGRAM_SAMPLES, max(map(len, pieces.samples)))
     n = 1 << (length - 1).bit_length()
     total, count = np.zeros((6, n // 2 + 1)), 0
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
-        parts = -(-len(samples) // PERIODOGRAM_SAMPLES)
+        parts = -(-len(samples) // resolutions.PERIODOGRAM_SAMPLES)
         for part in np.array_split(np.arange(len(t)), parts):
             taper = np.hanning(len(part))
             tapered = samples[part].T * taper
@@ -166,14 +135,15 @@ def _neighbour_variance(windows: Spectrum, pieces: WindowSamples) -> Array:
     They lie beyond the reach of a line: that of the taper of the shortest window.
     """
     count, size = windows.count, windows.power.shape[1]
-    cycle = pieces.rate / pieces.shortest_samples(PERIODOGRAM_SAMPLES)
+    cycle = pieces.rate / pieces.shortest_samples(resolutions.PERIODOGRAM_SAMPLES)
     close = max(
-        NEAREST_NEIGHBOUR, math.ceil(LINE_DISTANCE_CYCLES * cycle / windows.hz[1])
+        detections.NEAREST_NEIGHBOUR,
+        math.ceil(detections.LINE_DISTANCE_CYCLES * cycle / windows.hz[1]),
     )
     reach = close + max(
-        FURTHEST_NEIGHBOUR - NEAREST_NEIGHBOUR,
+        detections.FURTHEST_NEIGHBOUR - detections.NEAREST_NEIGHBOUR,
         close,
-        -(-LEVEL_PERIODOGRAMS // (2 * count)),
+        -(-resolutions.LEVEL_PERIODOGRAMS // (2 * count)),
     )
     kernel = np.ones(2 * reach + 1)
     kernel[reach - close : reach + close + 1] = 0.0
@@ -243,18 +213,22 @@ def _fourier_sums(values: Array, t: Array, rate: float, n: int) -> Complex:
     the times are those of arrival, samples count as evenly spaced.
     """
     at = (t - t[0]) * rate
-    even = np.ptp(at - np.arange(len(at))) < 0.5 / GRID_PER_SAMPLE
+    even = np.ptp(at - np.arange(len(at))) < 0.5 / resolutions.GRID_PER_SAMPLE
     if len(at) <= n and (even or _in_bursts(t, rate)):
         return np.fft.rfft(values, n)
-    place = np.round(at * GRID_PER_SAMPLE).astype(np.intp) % (n * GRID_PER_SAMPLE)
-    grid = [np.bincount(place, row, n * GRID_PER_SAMPLE) for row in values]
+    place = np.round(at * resolutions.GRID_PER_SAMPLE).astype(np.intp) % (
+        n * resolutions.GRID_PER_SAMPLE
+    )
+    grid = [np.bincount(place, row, n * resolutions.GRID_PER_SAMPLE) for row in values]
     whole: Complex = np.fft.rfft(np.array(grid))
     return whole[:, : n // 2 + 1]
 
 
 def _in_bursts(t: Array, rate: float) -> bool:
     """Whether times are those of arrival: many steps are shorter than a device's."""
-    return bool(np.mean(np.diff(t) * rate < SHORT_STEP) > SHORT_STEP_SHARE)
+    return bool(
+        np.mean(np.diff(t) * rate < detections.SHORT_STEP) > detections.SHORT_STEP_SHARE
+    )
 
 
 def _squared_magnitude(spectrum: Complex) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Mask
 from fieldcal.core.sampling import sampling_rate
+from fieldcal.model import detections, tolerances
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.change_points import clear_jumps
 from fieldcal.model.rows.row_source import RowSource
@@ -17,15 +18,6 @@ from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.physics.experience import Experience
 
 Complex = NDArray[np.complexfloating]
-
-SAMPLES_AT_ONCE = 1 << 16
-"""Samples of which a line is subtracted at once."""
-
-ROUNDING_ERROR = 1e-12
-"""Relative rounding error that removing a mean and a slope leaves of a constant."""
-
-MIN_WINDOW_SAMPLES = 64
-"""Fewest samples of a window that is searched for lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +70,7 @@ def long_windows(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
     return [
         (first[p], int(a), int(b))
         for p, (a, b) in bounds
-        if b - a >= MIN_WINDOW_SAMPLES and p in first
+        if b - a >= detections.MIN_LINE_SAMPLES and p in first
     ]
 
 
@@ -129,7 +121,7 @@ def _detrended(t: Array, values: Array, usable: Mask, cuts: Array) -> Array:
         slope = (s @ column) / max(float((s * s) @ known), 1e-12)
         column -= slope * s
         column *= known
-        rounding = ROUNDING_ERROR * np.abs(values[known, c]).max(initial=0.0)
+        rounding = tolerances.ROUNDING * np.abs(values[known, c]).max(initial=0.0)
         if np.abs(column).max(initial=0.0) > rounding:  # else it never changes
             out[:, c] = column
     return out
@@ -150,6 +142,6 @@ def subtract_line(values: Array, t: Array, hz: float, amplitude: Complex) -> Non
 
 
 def chunks(first: int, last: int) -> Iterator[slice]:
-    """Slices of at most `SAMPLES_AT_ONCE` samples, to limit memory."""
-    for start in range(first, last, SAMPLES_AT_ONCE):
-        yield slice(start, min(start + SAMPLES_AT_ONCE, last))
+    """Slices of at most `tolerances.SAMPLES_AT_ONCE` samples, to limit memory."""
+    for start in range(first, last, tolerances.SAMPLES_AT_ONCE):
+        yield slice(start, min(start + tolerances.SAMPLES_AT_ONCE, last))

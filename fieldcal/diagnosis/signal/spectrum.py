@@ -38,13 +38,10 @@ from fieldcal.diagnosis.signal.pieces import (
     subtract_line,
 )
 from fieldcal.effects import catalogue
-from fieldcal.model import thresholds
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.physics.effect import Line
-
-MAX_LINES, MAX_REJECTED_PEAKS = 4, 3
-"""Most lines, and most peaks that may turn out to be no line."""
 
 
 def find_lines(
@@ -57,8 +54,8 @@ def find_lines(
     spectra = compute_spectra(pieces) if pieces.samples else []
     while (
         spectra
-        and len(found) < MAX_LINES
-        and len(looked) < MAX_REJECTED_PEAKS + len(found)
+        and len(found) < tolerances.MAX_LINES
+        and len(looked) < tolerances.MAX_REJECTED_PEAKS + len(found)
     ):
         peak = highest_peak(pieces, spectra, looked)
         if peak is None:

@@ -15,12 +15,10 @@ from fieldcal.diagnosis.wording.deciding_position import (
     deciding_position,
     ladder_extent,
 )
-from fieldcal.diagnosis.wording.paragraph import MAX_LISTED_PLACES, angle_errors_text
+from fieldcal.diagnosis.wording.paragraph import angle_errors_text
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.physics.effect import Chain, Scatter
-
-MIN_HELD_OUT_POSITIONS = 3
-"""Fewest positions of which one can be held out."""
 
 
 def advice(
@@ -59,7 +57,7 @@ def advice(
     if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
         yield "Hold more positions, or hold them longer: random errors average out."
     held = len(explanation.dictionary.window_positions)
-    if held < MIN_HELD_OUT_POSITIONS:
+    if held < thresholds.MIN_ALIKE:
         yield f"Record more than {held} position{'s' * (held > 1)}: so few show little."
 
 
@@ -74,9 +72,8 @@ def _cure(name: str, mismatch: Sequence[Mismatch]) -> str:
     }
     if not isinstance(effect, Chain) or not places:
         return f"{name}: {effect.cure}"
-    return (
-        f"{name} at {list_positions(sorted(places), MAX_LISTED_PLACES)}: {effect.cure}"
-    )
+    listed = list_positions(sorted(places), thresholds.MAX_LISTED_PLACES)
+    return f"{name} at {listed}: {effect.cure}"
 
 
 def _how_to_decide(

@@ -16,15 +16,6 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Scatter
 
-MAX_LISTED_OCCURRENCES = 3
-"""Most occurrences of an effect that are listed one by one."""
-
-MAX_LISTED_PLACES = 6
-"""Most places that a paragraph lists, and positions that a sentence lists."""
-
-MAX_DECIMALS = 6
-"""Decimal places above which an uncertainty is written with an exponent."""
-
 
 def with_uncertainty(quantity: Quantity) -> str:
     """A value with its uncertainty and unit, to the second digit of the uncertainty.
@@ -41,7 +32,7 @@ def with_uncertainty(quantity: Quantity) -> str:
     if sigma is None or not math.isfinite(sigma) or sigma <= 0:
         return f"{quantity.value:.4g}{unit}"
     digits = 1 - math.floor(math.log10(sigma))
-    if digits > MAX_DECIMALS:
+    if digits > thresholds.MAX_DECIMALS:
         size = abs(quantity.value) or sigma
         significant = max(math.floor(math.log10(size)) + digits + 1, 2)
         return f"{quantity.value:#.{significant}g} ± {sigma:#.2g}{unit}"
@@ -119,7 +110,7 @@ def _listed(effects: Sequence[FoundEffect]) -> str:
     often = Counter(f.id for f in effects)
     names = [
         effect_with_parameters(f)
-        if often[f.id] <= MAX_LISTED_OCCURRENCES
+        if often[f.id] <= thresholds.MAX_LISTED_OCCURRENCES
         else f"{f.id} ({often[f.id]} times)"
         for f in effects
     ]
@@ -130,14 +121,14 @@ def _places(mismatch: Sequence[Mismatch]) -> str:
     """Where they differ, the largest difference first."""
     clearest = sorted(mismatch, key=lambda m: -m.sigma)
     places = list(dict.fromkeys(f"{m.channel}, {_where(m)}" for m in clearest))
-    more = len(places) - MAX_LISTED_PLACES
-    return "; ".join(places[:MAX_LISTED_PLACES]) + (
+    more = len(places) - thresholds.MAX_LISTED_PLACES
+    return "; ".join(places[: thresholds.MAX_LISTED_PLACES]) + (
         f"; {more} more places" if more > 0 else ""
     )
 
 
 def _where(m: Mismatch) -> str:
-    places = list_positions(m.positions, MAX_LISTED_PLACES)
+    places = list_positions(m.positions, thresholds.MAX_LISTED_PLACES)
     return f"{places}, {m.from_s:.0f} to {m.to_s:.0f} s"
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Index, Mask
-from fieldcal.model import priors
+from fieldcal.model import priors, tolerances
 from fieldcal.model.causes.basis import Course, General
 from fieldcal.physics.effect import Effect
 
@@ -17,20 +17,13 @@ Basis = Course | General
 Point = tuple[Mapping[str, float], int]
 """Values of an effect's shape parameters, and the index of the origin of its times."""
 
-MIN_WINDOWS = 3
-"""Number of windows below which their offsets are not separable from the bias."""
-
-CLOSURE = 6
+CLOSURE = len(CHANNELS)
 """Index of the instability of turns' closures; 0 to 5 are those of the six outputs."""
 
 TRIADS = (("acc", (0, 1, 2)), ("gyr", (3, 4, 5)))
 
 BOTH = frozenset({"acc", "gyr"})
 """Accelerometers and gyroscopes."""
-
-MAX_OFFERED_COLUMNS = 60
-"""Largest number of columns used to predict the gain of log evidence by a group: three
-axes of twenty cosines each."""
 
 Kind = Literal["effect", "random", "noise", "unknown", "position", "given"]
 
@@ -105,12 +98,12 @@ class Group:
 
         They predict the gain of log evidence by the group. The fast cosines of a course
         hardly change this gain, except for a random walk far above the noise. They are
-        all columns if the group has at most `MAX_OFFERED_COLUMNS`.
+        all columns if the group has at most `tolerances.MAX_OFFERED_COLUMNS`.
         """
-        if len(self.columns) <= MAX_OFFERED_COLUMNS:
+        if len(self.columns) <= tolerances.MAX_OFFERED_COLUMNS:
             return np.arange(len(self.columns))
         order = np.argsort(-self.typical, kind="stable")
-        return np.sort(order[:MAX_OFFERED_COLUMNS])
+        return np.sort(order[: tolerances.MAX_OFFERED_COLUMNS])
 
     def with_same_parameters(self, others: Iterable[Group]) -> list[Group]:
         """Groups among `others` with the same parameters, origin and positions."""

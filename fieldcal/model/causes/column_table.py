@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fieldcal.core.samples import GYR, Array, Index, Mask
+from fieldcal.model import resolutions
 from fieldcal.model.causes import columns, smooth
 from fieldcal.model.causes.basis import Course, General
 from fieldcal.model.causes.cause import TRIADS, Basis
@@ -93,7 +94,7 @@ class ColumnTable:
         each = ((part, np.intersect1d(c, self.observed)) for part, c in TRIADS)
         return [(part, channels) for part, channels in each if len(channels)]
 
-    def cosine_columns(self, channel: int, count: int = smooth.MAX_COSINES) -> Index:
+    def cosine_columns(self, channel: int, count: int = resolutions.COSINES) -> Index:
         """Columns of the first cosines in time of a channel, (count,)."""
         return self.waves + channel * self.span.count + np.arange(count)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import GYR, Array
+from fieldcal.model import tolerances
 from fieldcal.model.causes.basis import (
     CentralDifference,
     RowView,
@@ -21,9 +22,6 @@ from fieldcal.model.causes.basis import (
 )
 from fieldcal.model.state import State, perpendicular_vectors
 from fieldcal.physics.experience import Experience
-
-ROTATION_STEP_RAD = 1e-5
-"""Step of numerical derivatives by rotations, rad."""
 
 
 def bias(view: RowView) -> Array:
@@ -148,12 +146,14 @@ def attitude_sides(view: RowView) -> Iterator[CentralDifference]:
     state = view.state
     if not state.attitude.any():
         state = replace(state, attitude=np.zeros((len(state.small_rotation), 3)))
-    return state_sides(view.nominal, state, "attitude", ROTATION_STEP_RAD * np.eye(3))
+    return state_sides(
+        view.nominal, state, "attitude", tolerances.ROTATION_STEP_RAD * np.eye(3)
+    )
 
 
 def small_rotation_sides(view: RowView) -> Iterator[CentralDifference]:
     """Inputs for two small rotations of every position, rad."""
-    steps = ROTATION_STEP_RAD * np.eye(2)
+    steps = tolerances.ROTATION_STEP_RAD * np.eye(2)
     return state_sides(view.nominal, view.state, "small_rotation", steps)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import tolerances
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.basis import CentralDifference, General, RowView
 from fieldcal.model.causes.column_table import ColumnTable
@@ -61,7 +62,7 @@ def detent_columns(table: ColumnTable, shared: Sequence[Detent]) -> Index:
 
     def sides(view: RowView) -> Iterator[CentralDifference]:
         """Inputs for a change of each detent's error, a step up and down."""
-        steps = columns.ROTATION_STEP_RAD * rotations.T.reshape(len(shared), -1, 2)
+        steps = tolerances.ROTATION_STEP_RAD * rotations.T.reshape(len(shared), -1, 2)
         return columns.state_sides(view.nominal, view.state, "small_rotation", steps)
 
     basis = General(

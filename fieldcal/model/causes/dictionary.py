@@ -18,16 +18,10 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index, Mask
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.basis import General
-from fieldcal.model.causes.cause import (
-    CLOSURE,
-    MIN_WINDOWS,
-    Cause,
-    EqualWidthGroups,
-    Group,
-)
+from fieldcal.model.causes.cause import CLOSURE, Cause, EqualWidthGroups, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
@@ -246,7 +240,7 @@ class Dictionary(ColumnTable):
     def _instability(self) -> None:
         """Set the typical instability of windows, by channel, and of closures."""
         self.typical_instability = np.zeros(7)
-        if len(self.window_positions) >= MIN_WINDOWS:
+        if len(self.window_positions) >= thresholds.MIN_ALIKE:
             measured = self.used.any(axis=0)
             self.typical_instability[:6] = priors.INSTABILITY * self.unit * measured
             self.typical_instability[CLOSURE] = priors.CLOSURE_RAD * self.turns

@@ -14,6 +14,7 @@ from operator import itemgetter
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.model import tolerances
 from fieldcal.model.causes.basis import (
     CentralDifference,
     Course,
@@ -32,9 +33,6 @@ from fieldcal.physics.effect import (
     Separable,
 )
 from fieldcal.physics.experience import Experience
-
-DERIVATIVE_STEP = 1e-3
-"""Step of numerical derivatives, in typical sizes."""
 
 
 def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> General:
@@ -65,7 +63,7 @@ def _motion_basis(effect: Motion) -> General:
     def steps() -> Iterator[Array]:
         for j, param in enumerate(effect.params):
             step = np.zeros(len(effect.params))
-            step[j] = DERIVATIVE_STEP * param.typical
+            step[j] = tolerances.DERIVATIVE_STEP * param.typical
             yield step
 
     def sides(view: RowView) -> Iterator[CentralDifference]:

@@ -25,13 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model import priors
-
-MIN_TERMS, MAX_TERMS = 40, 80
-"""Bounds of the number of terms, which is half the number of rows."""
-
-MISSING_ROW_NOISE = 1e3
-"""Noise assumed for a missing row, as a multiple of the noise of the noisiest row."""
+from fieldcal.model import priors, resolutions, tolerances
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +57,10 @@ class FlickerSeries:
         variance, along = np.linalg.eigh(whole)
         order = np.argsort(variance)[:0:-1]  # without the smallest: that of the mean
         variance, along = np.maximum(variance[order], 0.0), along[:, order]
-        k, even = int(np.clip(len(t) // 2, MIN_TERMS, MAX_TERMS)), np.sqrt(len(t) / 2)
+        k, even = (
+            int(np.clip(len(t) // 2, resolutions.COSINES, resolutions.MAX_COSINES)),
+            np.sqrt(len(t) / 2),
+        )
         return cls(
             t, along[:, :k] * even, np.sqrt(variance[:k]) / even, along[:, k:],
             variance[k:],
@@ -88,7 +85,7 @@ class FlickerSeries:
         for c in np.flatnonzero(known.any(axis=0) & (len(self.variances) > 0)):
             measured = known[:, c]
             off = np.where(measured, y[:, c] - y[measured, c].mean(), 0.0)
-            wide = MISSING_ROW_NOISE * float(sd[measured, c].max())
+            wide = tolerances.NO_WEIGHT_NOISE * float(sd[measured, c].max())
             size[c] = self._size(off, np.where(measured, sd[:, c], wide), typical[c])
         return np.outer(unit, (size * typical) ** 2)
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model import priors
+from fieldcal.model import priors, resolutions
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
@@ -63,7 +63,7 @@ def leaning(table: ColumnTable) -> Group | None:
 
 def _share(leans: Index) -> float:
     """Part of the cosines that is used, so that their number stays limited."""
-    return min(1.0, priors.MAX_COSINES / int(leans.sum()))
+    return min(1.0, resolutions.MAX_COSINES / int(leans.sum()))
 
 
 def _ends(table: ColumnTable, p: int) -> tuple[float, float]:

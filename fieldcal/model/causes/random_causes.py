@@ -9,8 +9,8 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
-from fieldcal.model import priors
-from fieldcal.model.causes.cause import MIN_WINDOWS, Cause, Group
+from fieldcal.model import priors, thresholds
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
@@ -27,7 +27,9 @@ def random_causes(table: ColumnTable) -> Iterator[Cause]:
     for effect in catalogue().values():
         if isinstance(effect, Scatter) and effect.applies(table.x):
             yield from _causes_of_scatter(table, effect, oriented)
-    if len(table.window_positions) >= MIN_WINDOWS:  # else it is a permanent group
+    if (
+        len(table.window_positions) >= thresholds.MIN_ALIKE
+    ):  # else it is a permanent group
         for group in _cosine_flicker(table):
             yield Cause(
                 group.cause, group.part, priors.FLICKER_CHANCE, (group,), "noise"

@@ -22,7 +22,7 @@ from numpy.polynomial.legendre import legvander
 
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
-from fieldcal.model import priors
+from fieldcal.model import priors, resolutions, thresholds
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
@@ -30,12 +30,6 @@ from fieldcal.model.causes.effect_columns import effect_basis
 from fieldcal.physics.experience_rows import select_rows
 
 NAME = "sinking"
-
-POLYNOMIALS = 4
-"""Number of polynomials of each angle."""
-
-MIN_POSITIONS = 4
-"""Fewest positions with known angles that distinguish a base that turns from biases."""
 
 
 def sinking(table: ColumnTable) -> Group | None:
@@ -45,7 +39,7 @@ def sinking(table: ColumnTable) -> Group | None:
     """
     x = table.x
     known = x.oriented & (x.position >= 0)
-    if len(np.unique(x.position[known])) < MIN_POSITIONS:
+    if len(np.unique(x.position[known])) < thresholds.MIN_SINKING_POSITIONS:
         return None
     begin, end = float(x.t[known].min()), float(x.t[known].max())
     if begin == end:
@@ -53,7 +47,7 @@ def sinking(table: ColumnTable) -> Group | None:
     tilt = effect_basis(catalogue()["base_tilt"], {}, 0)
 
     def columns(view: RowView) -> Array:
-        out = np.zeros((len(view.x), 6, 2 * POLYNOMIALS))
+        out = np.zeros((len(view.x), 6, 2 * resolutions.POLYNOMIALS))
         rows = np.flatnonzero(view.nominal.oriented & (view.nominal.position >= 0))
         if not len(rows):
             return out
@@ -65,13 +59,13 @@ def sinking(table: ColumnTable) -> Group | None:
         )  # fmt: skip
         per_deg = tilt.evaluate(oriented)
         u = 2 * (view.x.t[rows] - begin) / (end - begin) - 1
-        course = legvander(u, POLYNOMIALS)[:, 1:]
+        course = legvander(u, resolutions.POLYNOMIALS)[:, 1:]
         out[rows] = (per_deg[..., None] * course[:, None, None]).reshape(
             len(rows), 6, -1
         )
         return out
 
-    at = table.add(General(NAME, columns), 2 * POLYNOMIALS)
-    fading = priors.SINK_FADING ** np.arange(POLYNOMIALS)
+    at = table.add(General(NAME, columns), 2 * resolutions.POLYNOMIALS)
+    fading = priors.SINK_FADING ** np.arange(resolutions.POLYNOMIALS)
     size = np.tile(np.rad2deg(priors.SINK_RAD) * fading, 2)
     return Group(NAME, "", at, size, random=True)

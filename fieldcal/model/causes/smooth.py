@@ -19,25 +19,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.model import priors, resolutions
 from fieldcal.physics.experience import Experience
-
-MAX_COSINES = 40
-"""Number of cosines of the fastest course; its prior makes further ones negligible."""
-
-HALF_WAVES = (1.5, 4.0, 9.0, 20.0)
-"""Half waves of a smooth course over the session, from slow to fast."""
-
-MIN_COSINE_SIZE = 1e-3
-"""Relative size below which a cosine is omitted from a course."""
-
-HARMONICS = 4
-"""Number of harmonics of an angle; an effect of its fourth power has four."""
-
-TIME_POWERS = 4
-"""Highest power of time in Legendre polynomials that multiply the force."""
-
-MAX_SINCE_TURN_S = 1e4
-"""Time since a turn from which nothing changes any more, s."""
 
 
 class CourseSpan:
@@ -56,7 +39,7 @@ class CourseSpan:
     """
 
     def __init__(
-        self, t: Array, count: int = MAX_COSINES, warming: Array | None = None
+        self, t: Array, count: int = resolutions.COSINES, warming: Array | None = None
     ) -> None:
         self.start, self.length = float(t[0]), max(float(np.ptp(t)), 1e-9)
         self.count = count
@@ -79,7 +62,7 @@ class CourseSpan:
     def fading(self, x: Experience) -> Array:
         """Force along each axis, in gravities, times polynomials of time, (n, 12)."""
         part = 2 * self._part(x) - 1
-        steps = np.polynomial.legendre.legvander(part, TIME_POWERS)[:, 1:]
+        steps = np.polynomial.legendre.legvander(part, resolutions.POLYNOMIALS)[:, 1:]
         f = x.f / x.gravity
         return (f[:, :, None] * steps[:, None, :]).reshape(len(x), -1)
 
@@ -99,16 +82,16 @@ def smooth_course_sizes(span: float) -> Array:
 
     The course has the rms 1.
     """
-    k = np.arange(1, MAX_COSINES + 1)
+    k = np.arange(1, resolutions.COSINES + 1)
     sizes: Array = np.exp(-0.5 * (k / span) ** 2)
-    sizes = sizes[sizes > MIN_COSINE_SIZE]
+    sizes = sizes[sizes > resolutions.MIN_COSINE_SIZE]
     unit_rms: Array = sizes / np.sqrt((sizes**2).sum() / 2)
     return unit_rms
 
 
 def force_time_columns(axis: int) -> slice:
     """Columns of `CourseSpan.fading` that contain the force along one axis."""
-    return slice(axis * TIME_POWERS, (axis + 1) * TIME_POWERS)
+    return slice(axis * resolutions.POLYNOMIALS, (axis + 1) * resolutions.POLYNOMIALS)
 
 
 def alpha(x: Experience) -> Array:
@@ -130,7 +113,7 @@ def joints(x: Experience) -> Array:
 
 def _angle(angle: Array) -> Array:
     """Sines and cosines of the harmonics of an angle (n,) rad, over k, (n, 8)."""
-    k = np.arange(1, HARMONICS + 1)
+    k = np.arange(1, resolutions.HARMONICS + 1)
     turns = np.outer(np.nan_to_num(angle), k)
     return np.hstack([np.sin(turns) / k, np.cos(turns) / k])
 
@@ -144,7 +127,7 @@ def force(x: Experience) -> Array:
 
 def since_turn(x: Experience) -> Array:
     """Powers of the logarithm of the time since the turn."""
-    part = np.log1p(np.clip(x.since_turn, 0.0, MAX_SINCE_TURN_S)) / np.log1p(100.0)
+    part = np.log1p(np.clip(x.since_turn, 0.0, priors.SETTLED_S)) / np.log1p(100.0)
     return _powers(part)
 
 

@@ -18,13 +18,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-
-MIN_TURNS = 3
-"""Number of turns from which an error of one of them can be recognised."""
 
 
 def turn_gyro_errors(table: ColumnTable) -> Iterator[Cause]:
@@ -35,7 +32,7 @@ def turn_gyro_errors(table: ColumnTable) -> Iterator[Cause]:
     last = np.array([(x.t - x.lasts / 2)[x.position == p].min() for p in held[1:]])
     seconds = last - first
     turns = np.flatnonzero(seconds > 0)
-    if len(turns) < MIN_TURNS:
+    if len(turns) < thresholds.MIN_ALIKE:
         return
 
     def columns(view: RowView) -> Array:

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fieldcal.core.samples import ACC, CHANNELS, Array, Index
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes import smooth
-from fieldcal.model.causes.cause import MIN_WINDOWS, Cause, Group
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 
 
@@ -27,7 +27,7 @@ def unknown_causes(table: ColumnTable) -> Iterator[Cause]:
                 for i, p in enumerate(table.window_positions)
             ]  # fmt: skip
             yield _cause("window", CHANNELS[c], groups)
-        if len(table.window_positions) > MIN_WINDOWS:
+        if len(table.window_positions) > thresholds.MIN_ALIKE:
             wide = np.full(len(at), sizes[c])
             yield _cause(
                 "position", CHANNELS[c], [Group("position", CHANNELS[c], at, wide)]
@@ -53,7 +53,7 @@ def _course_cause(
 ) -> Cause:
     """Cause of a smooth course in time on some channels at once."""
     groups = []
-    for span in smooth.HALF_WAVES:
+    for span in priors.HALF_WAVES:
         shape = smooth.smooth_course_sizes(span)
         waves = np.concatenate([table.cosine_columns(c, len(shape)) for c in channels])
         size = np.outer(sizes[channels], shape).ravel()
@@ -92,7 +92,7 @@ def _covers(table: ColumnTable, covariate: str) -> bool:
     if covariate == "temperature":
         return x.warms
     if covariate == "force and time":
-        return len(table.window_positions) > MIN_WINDOWS and _has_times(table)
+        return len(table.window_positions) > thresholds.MIN_ALIKE and _has_times(table)
     if covariate == "since turn":
         return bool(np.isfinite(x.since_turn).all())
     return len(table.window_positions) > 3

@@ -35,19 +35,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model import priors
-from fieldcal.model.causes import smooth
-from fieldcal.model.causes.cause import MIN_WINDOWS
+from fieldcal.model import priors, resolutions, thresholds, tolerances
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander_sizes import wander_sizes
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.lean_modes import lean_modes
-
-COSINES_PER_VISIBLE = 2.0
-"""Number of cosines used over the number that each exceed the noise of the rows."""
-
-MIN_PHASE = 1e-12
-"""Least phase between two means; flicker diverges at zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +78,13 @@ class Wander:
         walks = speed * np.sqrt(2 * length * information) / np.pi  # (5)
         resolved = np.fmax(walks, flicker**2 * information)  # (5)
         modes = np.clip(
-            COSINES_PER_VISIBLE * resolved, smooth.MAX_COSINES, priors.MAX_COSINES
+            resolutions.COSINES_PER_VISIBLE * resolved,
+            resolutions.COSINES,
+            resolutions.MAX_COSINES,
         ).astype(np.intp)
         leans = lean_modes(rows)
         out = cls(speed, flicker, share, modes, length, leans=leans)
-        if not len(np.unique(rows.x.position)) < MIN_WINDOWS < len(rows.x):
+        if not len(np.unique(rows.x.position)) < thresholds.MIN_ALIKE < len(rows.x):
             return out
         series = FlickerSeries.of(rows.x.t, rows.length)
         unseen = series.residual_variance(rows.y, rows.sd, priors.INSTABILITY * unit)
@@ -100,7 +94,7 @@ class Wander:
     def none(cls) -> Wander:
         """No random walk and no flicker."""
         nothing = np.zeros(6)
-        return cls(nothing, nothing, nothing, np.full(6, smooth.MAX_COSINES), 0.0)
+        return cls(nothing, nothing, nothing, np.full(6, resolutions.COSINES), 0.0)
 
     def residual_variance_of_rows(self, length: Array, channel: int) -> Array:
         """Variance of all rows that neither cosines nor series describe, (n,)."""
@@ -137,7 +131,9 @@ class Wander:
             left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - fitted @ (1 / k**2)
             own[:] = q**2 * self.length / np.pi**2 * left  # (3)
             if a:
-                all_cosines = -np.log(2 * np.sin(np.clip(y, MIN_PHASE, np.pi) / 2))
+                all_cosines = -np.log(
+                    2 * np.sin(np.clip(y, tolerances.ROUNDING, np.pi) / 2)
+                )
                 own += a**2 / 2 * (all_cosines - fitted @ (1 / k))  # (4)
             own.flat[diagonal] = variance
         return out
@@ -162,7 +158,10 @@ def _residual_of_walk(whole: float, length: Array, count: int) -> Array:
 
 def _residual_of_flicker(whole: float, length: Array, count: int) -> Array:
     """Variance (2) of means over `length` (n,) s of flicker with a = 1, (n,)."""
-    z, k = np.maximum(np.pi * length / whole, MIN_PHASE), np.arange(1, count + 1)
+    z, k = (
+        np.maximum(np.pi * length / whole, tolerances.ROUNDING),
+        np.arange(1, count + 1),
+    )
     taken = _means(z, k) ** 2 @ (1 / k)
     out: Array = np.maximum(1.5 - np.log(z) + z**2 / 144 - taken, 0.0) / 2  # (2)
     return out

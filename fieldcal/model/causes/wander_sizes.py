@@ -33,34 +33,20 @@ import numpy as np
 from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
-from fieldcal.model import priors
-from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS
+from fieldcal.model import detections, priors, resolutions, thresholds, tolerances
+from fieldcal.model.causes.cause import TRIADS
 from fieldcal.model.rows.averages import Rows
 from fieldcal.physics.effect import Scatter
 
-CHI2_MEDIAN, MEDIAN_LOG_SCATTER = 0.4549, 2.7
-"""Median of chi-squared with one degree of freedom; standard deviation of the log of a
-sample median over it, times the square root of the number of values."""
-
-VALUES_PER_SIZE = 4
-"""Values of v for each value of `priors.SIZES`."""
-
-SIZES: Array = np.geomspace(priors.SIZES[0], priors.SIZES[-1], VALUES_PER_SIZE * 32 + 1)
+STEPS = resolutions.VALUES_PER_SIZE * (len(priors.SIZES) - 1)
+SIZES: Array = np.geomspace(priors.SIZES[0], priors.SIZES[-1], STEPS + 1)
 """Values of v, in typical sizes, that are tried."""
 
 DENSITY: Array = (
-    np.interp(np.log(SIZES), np.log(priors.SIZES), priors.density()) / VALUES_PER_SIZE
+    np.interp(np.log(SIZES), np.log(priors.SIZES), priors.density())
+    / resolutions.VALUES_PER_SIZE
 )
 """Prior probability of each of `SIZES`."""
-
-DIFFERENCE_LAGS = (1, 3, 9)
-"""Distances between neighbouring means of a second difference, in rows."""
-
-MIN_DIFFERENCES = 8
-"""Least number of differences from which a size is estimated."""
-
-MIN_RATIO = 1e-12
-"""Least ratio r, for channels that repeat one value and have differences of zero."""
 
 
 class Differences(NamedTuple):
@@ -88,8 +74,10 @@ class Differences(NamedTuple):
         """
         variance = self.white + np.multiply.outer(squared_sizes, unit_variance)
         median = np.median(self.squares / variance, axis=1)
-        ratio = np.maximum(median / CHI2_MEDIAN, MIN_RATIO)
-        return -self.independent / 2 * (np.log(ratio) / MEDIAN_LOG_SCATTER) ** 2
+        ratio = np.maximum(median / detections.SQUARE_MEDIAN, tolerances.ROUNDING)
+        return (
+            -self.independent / 2 * (np.log(ratio) / detections.MEDIAN_LOG_SCATTER) ** 2
+        )
 
 
 def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
@@ -97,16 +85,16 @@ def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
 
     Both are root mean squares over all sizes, including zero, weighted by their
     probabilities. The third result is the probability that an output has flicker, (6,),
-    given that it has a random walk or flicker. With fewer than `MIN_WINDOWS` windows,
-    flicker is a permanent group of the model; its size here is then zero. `unit` (6,)
-    are outputs per SI unit.
+    given that it has a random walk or flicker. With fewer windows than
+    `thresholds.MIN_ALIKE`, flicker is a permanent group of the model; its size here is
+    then zero. `unit` (6,) are outputs per SI unit.
     """
     walk, walk_chance = _typical_walk(rows)
     out, evidence = np.zeros((2, 6)), np.zeros((2, 6))
-    few = len(np.unique(rows.x.position)) < MIN_WINDOWS
+    few = len(np.unique(rows.x.position)) < thresholds.MIN_ALIKE
     for _, triad in TRIADS:
         at = list(triad)
-        lags = DIFFERENCE_LAGS
+        lags = detections.DIFFERENCE_LAGS
         differences = [[d for k in lags for d in _differences(rows, c, k)] for c in at]
         walks = WanderHypotheses(
             walk[at] * unit[at], walk_chance, priors.SINGLE_AXIS_SHARE
@@ -191,7 +179,7 @@ def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
     y, sd, t = rows.y[:, c], rows.sd[:, c], rows.x.t
     used = rows.used[:, c]
     at = at[used[at] & used[at + lag] & used[at + 2 * lag]]
-    if len(at) < MIN_DIFFERENCES:
+    if len(at) < detections.MIN_SAMPLES:
         return
     length, tau = rows.length[at + lag], (t[at + 2 * lag] - t[at]) / 2
     x = np.maximum(tau / length, 1.0)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-
-UNDIVIDED_SIZE = 64
-"""Largest matrix that is inverted without division into halves."""
+from fieldcal.model import tolerances
 
 
 def cholesky_root(scaled: Array) -> Array:
@@ -38,7 +36,7 @@ def triangular_inverse(root: Array) -> Array:
     np.True_
     """
     width = root.shape[-1]
-    if width <= UNDIVIDED_SIZE:
+    if width <= tolerances.UNDIVIDED_SIZE:
         return np.linalg.inv(root)
     k = width // 2
     out = np.zeros(root.shape)

@@ -22,13 +22,11 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import tolerances
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.evidence.tridiagonal import is_wide, tridiagonal_gains
 from fieldcal.model.priors import SIZES
-
-MIN_EIGENVALUE = 1e-9
-"""Relative size of an eigenvalue below which it is a rounding error."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +159,7 @@ def group_directions(
     else:
         strength, axes = np.linalg.eigh(inner)
         power = (np.swapaxes(axes, -1, -2) @ rhs[..., None])[..., 0] ** 2
-    determined = strength > MIN_EIGENVALUE * np.maximum(
+    determined = strength > tolerances.SINGULAR * np.maximum(
         np.asarray(own)[..., None], 1e-300
     )
     strength = np.where(determined, strength, 0.0)

@@ -29,11 +29,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
+from fieldcal.model import tolerances
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.gram import Gram
-
-MAX_NUMBERS = 4_000_000
-"""Largest number of table elements that are calculated at once: 30 MB."""
 
 
 class InstabilityScan(NamedTuple):
@@ -85,7 +83,7 @@ def scan_instabilities(
     reduced = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
     table = _joint_table(reduced, columns, further.ravel())
     rows, width = int(moved.sum()), len(common)
-    step = max(1, MAX_NUMBERS // (width * (rows + width)))
+    step = max(1, tolerances.MAX_NUMBERS // (width * (rows + width)))
     parts = []
     for first in range(0, len(taus), step):
         part = slice(first, first + step)

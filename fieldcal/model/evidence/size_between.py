@@ -5,16 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model import priors
+from fieldcal.model import priors, resolutions, tolerances
 from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sizing import LOG_DENSITY, LOG_SIZE_STEP, gain_terms
-
-REFINED_SIZES = 129
-"""Number of sizes that are tried between the neighbours of a size of the grid."""
-
-
-MIN_SIZE_INFORMATION = 0.1
-"""Least information on ln v."""
 
 
 def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
@@ -23,12 +16,14 @@ def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, f
     `at` are the indices of its columns in the state, `v` its size there.
     """
     strength, power = gain_terms(state, at, v)
-    near = v * np.exp(np.linspace(-LOG_SIZE_STEP, LOG_SIZE_STEP, REFINED_SIZES))
+    near = v * np.exp(
+        np.linspace(-LOG_SIZE_STEP, LOG_SIZE_STEP, resolutions.REFINED_SIZES)
+    )
     before = np.interp(np.log(near), np.log(priors.SIZES), LOG_DENSITY)
     best = float(
         near[np.argmax(gains_from_eigenvalues(strength, power, near) + before)]
     )
-    info = np.maximum(_information(strength, best), MIN_SIZE_INFORMATION)
+    info = np.maximum(_information(strength, best), tolerances.MIN_SIZE_INFORMATION)
     return best, float(info**-0.5)
 
 
@@ -42,7 +37,7 @@ def most_probable_axis_size(
     """
     strength, power = gain_terms(state, at, v)
     middle, middle_sigma = triad
-    distance = np.linspace(-4.0, 4.0, REFINED_SIZES)
+    distance = np.linspace(-4.0, 4.0, resolutions.REFINED_SIZES)
     near = middle * np.exp(priors.AXES_LOG_SPREAD * distance)
     top = int(
         np.argmax(gains_from_eigenvalues(strength, power, near) - 0.5 * distance**2)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model import priors
+from fieldcal.model import priors, tolerances
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
@@ -33,12 +33,6 @@ UNIT_INDEX = int(np.argmin(np.abs(np.log(priors.SIZES))))
 LOG_SIZE_STEP = float(np.log(priors.SIZES[1] / priors.SIZES[0]))
 """Step of ln v between neighbouring sizes."""
 
-
-MAX_ROUNDS = 5
-"""Largest number of passes over all sizes."""
-
-MIN_VARIANCE_RATIO = 1e-14
-"""Least ratio of posterior to prior variance; smaller ones are rounding errors."""
 
 TRIADS = ((0, 1, 2), (3, 4, 5), (6,))
 """Instabilities with similar sizes: those of a triad's axes, and that of closures."""
@@ -105,15 +99,11 @@ def gain_terms(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, A
     part, axes = np.linalg.eigh(
         cov / prior_sigma[..., :, None] / prior_sigma[..., None, :]
     )
-    part = np.clip(part, MIN_VARIANCE_RATIO, 1.0)
+    part = np.clip(part, tolerances.ROUNDING, 1.0)
     along = (np.swapaxes(axes, -1, -2) @ (state.estimate[at] / prior_sigma)[..., None])[
         ..., 0
     ]
     return (1 / part - 1) / size**2, (along / (part * size)) ** 2
-
-
-LOG_ROUNDING_ERROR = 1e-6
-"""Rounding error of F, ln."""
 
 
 class Sizing:
@@ -162,7 +152,7 @@ class Sizing:
         free.sort(key=lambda i: self.groups[i].random)
         channels = np.flatnonzero(self.typical_instability > 0).tolist()
         profiles: list[Array] = []
-        for _ in range(MAX_ROUNDS):
+        for _ in range(tolerances.MAX_SIZE_ROUNDS):
             before = (*self.sizes, *self.instability)
             profiles = self._maximise_groups(free)
             for triad in TRIADS:
@@ -241,7 +231,7 @@ class Sizing:
         if self.instability == before or self._score_of_instability() >= (
             state.score
             + float(instability_log_prior(before, self.typical_instability))
-            - LOG_ROUNDING_ERROR
+            - tolerances.ACCUMULATED_ROUNDING
         ):
             return profiles
         self.instability = before
@@ -311,6 +301,6 @@ class Sizing:
             typical = self.typical_instability[list(channels)][:, None] ** 2
             present = priors.SIZES[[self.instability[c] for c in channels]][:, None]
             more = typical * (priors.SIZES**2 - present**2)
-            gains = tridiagonal_gains(inner, rhs, more, MIN_VARIANCE_RATIO)
+            gains = tridiagonal_gains(inner, rhs, more, tolerances.ROUNDING)
             self._gains_by_channel[key] = gains
         return self._gains_by_channel[key]

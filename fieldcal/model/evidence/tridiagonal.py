@@ -19,22 +19,16 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.model import tolerances
 from fieldcal.model.priors import SIZES
-
-PIVOTS_PER_LOGARITHM = 8
-"""Number of pivots whose product is in the range of a float."""
-
-BLOCK = 32
-"""Columns that LAPACK reduces together; its work space is for so many."""
-
-MIN_WIDTH, MIN_COLUMNS = 16, 40
-"""Least width of groups, and least number of columns of all of them, for which this is
-faster."""
 
 
 def is_wide(rhs: Array) -> bool:
     """Whether this is faster than eigenvectors for groups, (..., k)."""
-    return rhs.shape[-1] >= MIN_WIDTH and rhs.size >= MIN_COLUMNS
+    return (
+        rhs.shape[-1] >= tolerances.MIN_TRIDIAGONAL_WIDTH
+        and rhs.size >= tolerances.MIN_TRIDIAGONAL_COLUMNS
+    )
 
 
 def tridiagonal_gains(
@@ -64,7 +58,7 @@ def tridiagonal_gains(
         here -= taken / last  # (1)
         np.maximum(here, least, out=here)
     products = np.multiply.reduceat(
-        pivots, np.arange(0, width, PIVOTS_PER_LOGARITHM), axis=0
+        pivots, np.arange(0, width, tolerances.PIVOTS_PER_LOGARITHM), axis=0
     )
     gain: Array = 0.5 * (power[0] / pivots[0] - np.log(products).sum(axis=0))  # (2)
     return gain.reshape(*rhs.shape[:-1], square.shape[-1])
@@ -80,6 +74,8 @@ def _reduced(inner: Array, rhs: Array) -> tuple[Array, Array]:
     bordered[:, 1:, 1:] = inner
     diagonal, border = np.empty((width, n)), np.empty((width, n))
     for i, matrix in enumerate(bordered):
-        _, whole, beside, _, _ = dsytrd(matrix.T, 1, BLOCK * len(matrix), 1)
+        _, whole, beside, _, _ = dsytrd(
+            matrix.T, 1, tolerances.LAPACK_BLOCK * len(matrix), 1
+        )
         diagonal[:, i], border[:, i] = whole[1:], beside
     return diagonal, border

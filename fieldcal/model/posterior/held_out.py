@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
-from fieldcal.model.causes.cause import MIN_WINDOWS
+from fieldcal.model import resolutions, thresholds, tolerances
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
@@ -21,17 +21,6 @@ from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
-
-MAX_FOLDS = 12
-"""Largest number of parts that are held out; each is one or several positions."""
-
-STRETCHES_PER_WINDOW = 24
-"""Number of parts of each window if there are too few windows. They are short, since
-random processes predict for a short time only."""
-
-MAX_COMPARED_SETS, MAX_LOG_DISTANCE = 6, 20.0
-"""Largest number of sets that are compared again without a part, and their largest
-distance from the best, ln."""
 
 
 class HeldOut:
@@ -64,7 +53,7 @@ class HeldOut:
             estimate = estimates_by_column(chosen.state, d)
             step = self.fitted.values - estimate + _random_estimate(chosen, d)
             places = d.window_positions[np.isin(d.window_positions, d.x.position[left])]
-            if len(d.window_positions) >= MIN_WINDOWS:
+            if len(d.window_positions) >= thresholds.MIN_ALIKE:
                 step[d.rotations_of(places)] = 0.0
             rows = [p.select_rows(left[p.rows]) for p in self.linear]
             _predict(out, rows, step, chosen, d)
@@ -136,9 +125,11 @@ def held_out_residuals(fitted: FittedSet, sets: Sequence[Set]) -> Array:
 def candidate_sets(best: Set, visited: Sequence[Set]) -> list[Set]:
     """Sets that may be the best without a part: the best, those near it, the empty."""
     ranked = sorted(visited, key=lambda s: -s.score)
-    near = [s for s in ranked if s.score > best.score - MAX_LOG_DISTANCE]
+    near = [
+        s for s in ranked if s.score > best.score - thresholds.COMPARED_LOG_DISTANCE
+    ]
     none = [s for s in ranked if not s.members]
-    return list(dict.fromkeys([best, *near[:MAX_COMPARED_SETS], *none]))
+    return list(dict.fromkeys([best, *near[: tolerances.MAX_COMPARED_SETS], *none]))
 
 
 def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Array:
@@ -146,8 +137,8 @@ def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Arr
     d, out = fitted.dictionary, []
     columns = _columns(d, [fitted.set]) | (fitted.values != 0)
     linear = [part.select_columns(columns) for part in fitted.linear]
-    for i in range(min(len(turns), MAX_FOLDS)):
-        left = turns[i::MAX_FOLDS]
+    for i in range(min(len(turns), tolerances.MAX_FOLDS)):
+        left = turns[i :: tolerances.MAX_FOLDS]
         kept = [t for t in turns if all(t is not other for other in left)]
         rows = gram(linear, d, fitted.values, kept, np.flatnonzero(columns))
         chosen = Sets(d, rows).evaluate(fitted.set.members, fitted.set.sizes)
@@ -165,14 +156,16 @@ def turn_residual(turn: TurnRows, estimate: Array) -> Array:
 def folds(d: Dictionary) -> Index:
     """Number of the part that each row is left out in, (n,)."""
     index = np.searchsorted(d.window_positions, d.x.position)
-    if len(d.window_positions) >= MIN_WINDOWS:
-        return (index % MAX_FOLDS).astype(np.intp)
+    if len(d.window_positions) >= thresholds.MIN_ALIKE:
+        return (index % tolerances.MAX_FOLDS).astype(np.intp)
     out = np.zeros(len(index), dtype=np.intp)
     for p in d.window_positions:
         for i, part in enumerate(
-            np.array_split(np.flatnonzero(d.x.position == p), STRETCHES_PER_WINDOW)
+            np.array_split(
+                np.flatnonzero(d.x.position == p), resolutions.STRETCHES_PER_WINDOW
+            )
         ):
-            out[part] = i % MAX_FOLDS
+            out[part] = i % tolerances.MAX_FOLDS
     return out
 
 

@@ -23,7 +23,7 @@ from itertools import product
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.unknown_causes import typical_unknown_sizes
 from fieldcal.model.evidence.eliminated import evidence_gains
@@ -38,19 +38,12 @@ from fieldcal.model.evidence.sizing import (
     instability_log_prior,
 )
 
-MAX_LOG_DISTANCE = 4.0
-"""Difference of log evidence to the best, beyond which a hypothesis is omitted: odds of
-1 to 55."""
-
 GIVEN_SET_LOG_DENSITY = np.log(priors.instability_density_of_given_set())
 """Log prior of instabilities if no causes were searched for: then causes that are not
 in the set may add to the scatter of windows."""
 
 NONE: Index = np.empty((0, 1), dtype=np.intp)
 """No columns."""
-
-MIN_INSTABILITY = 0.2
-"""Smallest instability that is distinguishable, in units of the noise of a mean."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +136,8 @@ class Mixing:
         """Average over all hypotheses that count."""
         lists = [self._triad_hypotheses(triad) for triad in TRIADS]
         best = sum(max(h.score for h in hypotheses) for hypotheses in lists)
-        near = [parts for parts in product(*lists)
-                if sum(h.score for h in parts) > best - MAX_LOG_DISTANCE]  # fmt: skip
+        least = best - thresholds.AVERAGED_LOG_DISTANCE
+        near = [p for p in product(*lists) if sum(h.score for h in p) > least]
         sizes = priors.SIZES[[self._sizes_of(parts) for parts in near]]
         tau = sizes * self.typical_instability
         score, means, covariances = self._combine_exactly(near, tau)
@@ -205,12 +198,16 @@ class Mixing:
             by_window = np.logaddexp.reduce(with_bad, axis=(0, 2))
             total = np.logaddexp.reduce([*without_bad, *by_window])
             self.bad = np.exp(by_window - total)
-            near = np.argwhere(with_bad > without_bad.max() - MAX_LOG_DISTANCE)
+            near = np.argwhere(
+                with_bad > without_bad.max() - thresholds.AVERAGED_LOG_DISTANCE
+            )
             for n, i, v in near.tolist():
                 prior, score = float(log_prior[n, v]), float(with_bad[n, i, v])
                 hypotheses.append(Hypothesis(sizes[n], i, v, prior, score))
         best = max(h.score for h in hypotheses)
-        return [h for h in hypotheses if h.score > best - MAX_LOG_DISTANCE]
+        return [
+            h for h in hypotheses if h.score > best - thresholds.AVERAGED_LOG_DISTANCE
+        ]
 
     def _shifted(self, triad: Sequence[int]) -> tuple[list[tuple[int, ...]], Array]:
         """Instabilities of a triad, all scaled together, with their log priors.
@@ -239,7 +236,9 @@ class Mixing:
         measured = np.isin(self.gram.kind, triad) & (self.gram.info > 0)
         noise = 1 / np.sqrt(self.gram.info[measured].max(initial=1e-300))
         typical = float(self.typical_instability[list(triad)].max())
-        return int(np.searchsorted(priors.SIZES * typical, MIN_INSTABILITY * noise))
+        return int(
+            np.searchsorted(priors.SIZES * typical, thresholds.MIN_INSTABILITY * noise)
+        )
 
     def _bad_window_gains(self, scan: InstabilityScan) -> Array:
         """Gains if a window is bad, by instability, window and size, (n, w, v)."""

@@ -27,6 +27,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.eliminated import Eliminated
@@ -34,11 +35,7 @@ from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.evidence.unfitted_groups import groups_not_in
 from fieldcal.model.posterior.common_axes import group_in, parameter_rows, pick_columns
-from fieldcal.model.posterior.mixture import (
-    MAX_LOG_DISTANCE,
-    Mixing,
-    covariance_of_means,
-)
+from fieldcal.model.posterior.mixture import Mixing, covariance_of_means
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.search.set_at_instability import with_typical_calibration
 
@@ -89,7 +86,7 @@ class ModelAverage:
     def sets(self) -> list[tuple[Set, float]]:
         """Sets with enough weight, averaged over sizes, and their weights."""
         visited, out = self.posterior.weights_on_grid, list[tuple[Set, float]]()
-        least = np.exp(-MAX_LOG_DISTANCE) * max(w for _, w in visited)
+        least = np.exp(-thresholds.AVERAGED_LOG_DISTANCE) * max(w for _, w in visited)
         for fitted, weight in visited:
             if weight > least:
                 averaged = self._with_mixed_sizes(fitted)

@@ -17,15 +17,14 @@ from math import fsum
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model import thresholds
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.causes.cause import BOTH, Group, triads_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.restarts import visit_restart
 from fieldcal.model.search.selection import Search
-from fieldcal.model.search.variations import ALTERNATIVE_MARGIN, visit_variations
+from fieldcal.model.search.variations import visit_variations
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +76,7 @@ class Posterior:
         alternatives = {name: self._alternatives_to(name) for name in names}
         self.alternatives = {n: alternatives[n] for n in self.cause_names(best)}
         for visited in list(self.sets.visited.values()) if best.members else ():
-            if visited.score > best.score - MAX_LOG_DISTANCE:
+            if visited.score > best.score - thresholds.AVERAGED_LOG_DISTANCE:
                 visit_variations(self.sets, visited, best.score)
         self._visit_likely_additions()
         visit_restart(self.sets, best)
@@ -92,7 +91,7 @@ class Posterior:
         offers = self.search.offers
         shown = offers.shown_in_addition(self.best)
         for offer in offers.ranked(self.best):
-            near = offer.score > self.best.score - ALTERNATIVE_MARGIN
+            near = offer.score > self.best.score - thresholds.ALTERNATIVE_LOG_DISTANCE
             if near and shown(offer.member[1]):
                 offers.accept(self.best, offer)
 
@@ -124,10 +123,11 @@ class Posterior:
             # kept if near by evidence alone (an alias), or with its prior (it counts)
             if (
                 cause.name == name
-                or min(behind, likely - offer.score) > ALTERNATIVE_MARGIN
+                or min(behind, likely - offer.score)
+                > thresholds.ALTERNATIVE_LOG_DISTANCE
             ):
                 continue
-            if (near := near + 1) > MAX_ALTERNATIVES:
+            if (near := near + 1) > tolerances.MAX_ALTERNATIVES:
                 break
             alternative = self._with_both_triads(less, offer, parts, offers)
             if not cause.reportable:  # its set counts, but noise is no alias
@@ -269,7 +269,3 @@ def _has_time_constant(group: Group) -> bool:
     """Whether a group has a time constant."""
     shapes = group.effect.shapes if group.effect else ()
     return any(s.kind in ("session", "turn", "joint") for s in shapes)
-
-
-MAX_ALTERNATIVES = 8
-"""Largest number of causes that are tried instead of one; further ones are worse."""

@@ -14,12 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.model_average import average_over_sizes
 from fieldcal.model.search.inference import InferenceResult
-
-MAX_LOG_SIGMA = 1.0
-"""Largest sigma of the logarithm of a time constant that is used."""
 
 
 def sets_at_other_time_constants(found: InferenceResult) -> list[Set]:
@@ -28,7 +26,7 @@ def sets_at_other_time_constants(found: InferenceResult) -> list[Set]:
     Empty if it has no time constant, or none with a known sigma.
     """
     constants = [
-        (i, name, min(group.shape_sigma / value, MAX_LOG_SIGMA))
+        (i, name, min(group.shape_sigma / value, thresholds.MAX_SHAPE_LOG_SIGMA))
         for i, (_, group) in enumerate(found.best.members)
         for name, value in group.shape.items()
         if np.isfinite(group.shape_sigma)

@@ -22,11 +22,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import tolerances
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.system.turn_rows import TurnRows
-
-MIN_EIGENVALUE = 1e-6
-"""Eigenvalues of P below this part of the largest one are numerical errors."""
 
 
 def turn_force_information(
@@ -58,7 +56,7 @@ def turn_force_information(
     info = a.T @ a - a.T @ b @ solved[:, :-1]
     rhs = a.T @ (white - b @ solved[:, -1])
     size, along = np.linalg.eigh(info)
-    kept = size > MIN_EIGENVALUE * max(size.max(initial=0.0), MIN_EIGENVALUE)
+    kept = size > tolerances.SINGULAR * max(size.max(initial=0.0), tolerances.SINGULAR)
     root = np.sqrt(size[kept])
     rows, off = along[:, kept].T * root[:, None], along[:, kept].T @ rhs / root
     left = white @ white - white @ b @ solved[:, -1] - off @ off

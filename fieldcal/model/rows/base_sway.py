@@ -18,22 +18,12 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.positions import table_rates
 from fieldcal.core.samples import Array, Block, Index
 from fieldcal.core.sampling import sampling_rate
+from fieldcal.model import detections, resolutions
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 from fieldcal.windows.sway import find_sway
 from fieldcal.windows.sway_process import needed_seconds
 from fieldcal.windows.sway_waves import SwayWaves
-
-MIN_SWAY_RAD = float(np.deg2rad(0.2))
-"""Turning from which it is taken out so, rad. What is less moves gravity by less than
-3e-5 m/s^2 in the mean, and is a line as any other where it is regular."""
-
-MIN_SWAYING_SHARE = 0.5
-"""Part of the windows that must sway: a base does not sway in one of them alone."""
-
-ROTATION_STEP_S, WINDOW_MARGIN_S = 0.1, 0.03
-"""In which a rotation is added to the way, s, and before a window in which the way may
-end already: its steps are as long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +89,13 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
         if b > a and (waves := find_sway(felt.t[a:b], felt[a:b].six))
     }
     swaying = [waves_by_position[p] for p in fixed if p in waves_by_position]
-    if len(swaying) < MIN_SWAYING_SHARE * len(fixed):
+    if len(swaying) < detections.MIN_SWAYING_SHARE * len(fixed):
         return None
     sizes = np.array(
         [np.mean([w.mean_squares for w in waves], axis=0) for waves in swaying]
     )
     amplitude = np.sqrt(2 * sizes[:, 0])
-    if np.sqrt((amplitude**2).mean()) < MIN_SWAY_RAD:
+    if np.sqrt((amplitude**2).mean()) < detections.MIN_SWAY_RAD:
         return None
     hz = np.sqrt(sizes[:, 1] / sizes[:, 0]) / (2 * np.pi)
     lost = about.gravity * float(sizes[:, 0].mean()) / 2  # <phi^2> / 2 of gravity
@@ -165,7 +155,7 @@ def _without_sway(
         edges = [a, *np.searchsorted(block.t, middles).tolist(), b]
         for waves, (first, last) in zip(of_window, pairwise(edges), strict=True):
             six[first:last] -= waves.outputs(block.t[first:last])
-    few = max(1, round(ROTATION_STEP_S * rate))
+    few = max(1, round(resolutions.ROTATION_STEP_S * rate))
     ordered = sorted((int(a), int(b), p) for p, (a, b) in enumerate(windows) if b > a)
     for (_, end, p), (start, _, q) in pairwise(ordered):
         if start - end < 4 * few:
@@ -175,7 +165,7 @@ def _without_sway(
             six[end + few : end + 2 * few, 3:] += turned * rate / few
         if q in waves_by_position:
             waves = waves_by_position[q][0]
-            last = start - 1 - round(WINDOW_MARGIN_S * rate)
+            last = start - 1 - round(detections.WINDOW_MARGIN_S * rate)
             # the rate falls to rest from this sample to the next one
             turned = waves.turn_angle(block.t[last : last + 2].mean(keepdims=True))[0]
             six[last + 1 : start, 3:] -= waves.outputs(block.t[last + 1 : start])[:, 3:]

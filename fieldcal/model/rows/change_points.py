@@ -18,14 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import detections
 from fieldcal.model.rows.averages import Rows
-
-ROWS_BESIDE = (1, 2, 4, 8)
-"""Rows on either side: a jump amid flicker shows best in some of them."""
-
-CLEAR_JUMP_SIGMAS = 16.0
-"""Standard deviations of the difference, by the scatter beside it, of a clear jump: a
-sine of any frequency comes to 12.7 at most, a ramp to 7.9."""
 
 
 def change_points(rows: Rows) -> Array:
@@ -34,7 +28,7 @@ def change_points(rows: Rows) -> Array:
     for window in _windows(rows):
         for c in range(6):
             used = window[rows.used[window, c]]
-            for m in ROWS_BESIDE:
+            for m in detections.ROWS_BESIDE_JUMP:
                 if len(used) < 2 * m:
                     break
                 size = _changes(rows.y[used, c], rows.sd[used, c] ** 2, m)
@@ -50,7 +44,7 @@ def clear_jumps(rows: Rows) -> list[tuple[float, float]]:
 
     Of each output of a window the largest.
     """
-    jumps, m = set[tuple[float, float]](), ROWS_BESIDE[-1]
+    jumps, m = set[tuple[float, float]](), detections.ROWS_BESIDE_JUMP[-1]
     for window in _windows(rows):
         for c in range(6):
             used = window[rows.used[window, c]]
@@ -60,8 +54,12 @@ def clear_jumps(rows: Rows) -> list[tuple[float, float]]:
             before, after = beside[: -m - 1], beside[m + 1 :]  # a row lies between
             scatter = (before.var(axis=1, ddof=1) + after.var(axis=1, ddof=1)) / m
             change = after.mean(axis=1) - before.mean(axis=1)
-            k = int(np.argmax(np.abs(change) - CLEAR_JUMP_SIGMAS * np.sqrt(scatter)))
-            if abs(change[k]) > CLEAR_JUMP_SIGMAS * np.sqrt(scatter[k]):
+            k = int(
+                np.argmax(
+                    np.abs(change) - detections.CLEAR_JUMP_SIGMAS * np.sqrt(scatter)
+                )
+            )
+            if abs(change[k]) > detections.CLEAR_JUMP_SIGMAS * np.sqrt(scatter[k]):
                 start, end = rows.span[used[k + m]].tolist()
                 jumps.add((start, end))
     return sorted(jumps)

@@ -30,31 +30,7 @@ from itertools import pairwise
 import numpy as np
 
 from fieldcal.core.samples import Array
-
-BAND_RATIO, MIN_BAND_COEFFICIENTS = 1.25, 5
-"""Of the ends of a band, and coefficients of one at least."""
-
-USUAL_SLOPE = 1.0
-"""Usual change of ln P in a factor e of frequency: flicker makes 1, a walk 2."""
-
-WALK_SLOPE, SLOPE_REACH = 2.0, 1.5
-"""Slope of ln P of a walk, and how far beyond the lowest frequency slopes are told by,
-in ln of it."""
-
-AXES_LOG_SPREAD = 0.5
-"""Spread of ln P among the axes of a triad, but for how loud each is: made alike."""
-
-MAX_NEWTON_STEPS = 30
-"""Steps at most; each is damped."""
-
-MIN_LOG_DISTANCE, CONVERGED = 0.1, 1e-6
-"""Least distance of two places that is counted, and largest last step, both ln."""
-
-MIN_BAND_DOF = 1e-3
-"""Degrees of freedom of a band of which columns take all."""
-
-MIN_POWER = 1e-24
-"""Power below which a channel repeats its reference, in its unit squared."""
+from fieldcal.model import detections, priors, resolutions, tolerances
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +53,17 @@ class Bands:
         rising = np.sort(frequency[frequency > 0])
         starts, at = [0], 0
         while at < len(rising):
-            end = int(np.searchsorted(rising, rising[at] * BAND_RATIO, side="right"))
-            end = max(end, at + MIN_BAND_COEFFICIENTS)
-            at = len(rising) if len(rising) - end < MIN_BAND_COEFFICIENTS else end
+            end = int(
+                np.searchsorted(
+                    rising, rising[at] * resolutions.BAND_RATIO, side="right"
+                )
+            )
+            end = max(end, at + resolutions.MIN_BAND_COEFFICIENTS)
+            at = (
+                len(rising)
+                if len(rising) - end < resolutions.MIN_BAND_COEFFICIENTS
+                else end
+            )
             starts.append(at)
         middle = [float(np.mean(np.log(rising[a:b]))) for a, b in pairwise(starts)]
         edges = np.append(rising[starts[:-1]], np.inf)
@@ -101,14 +85,19 @@ class Bands:
         of = np.searchsorted(self.edges, frequency[moves], side="right") - 1
         of, count = np.maximum(of, 0), len(self.edges) - 1
         free = np.array([np.bincount(of, 1 - h[moves], count) for h in leverage])
-        free = np.maximum(free, MIN_BAND_DOF)
+        free = np.maximum(free, tolerances.MIN_BAND_DOF)
         square = np.array([np.bincount(of, r[moves] ** 2, count) for r in left])
-        raw = np.log(np.maximum(square / free, MIN_POWER))
-        loud = np.average(raw, axis=1, weights=np.minimum(free, MIN_BAND_COEFFICIENTS))
+        raw = np.log(np.maximum(square / free, tolerances.MIN_POWER))
+        loud = np.average(
+            raw, axis=1, weights=np.minimum(free, resolutions.MIN_BAND_COEFFICIENTS)
+        )
         even = (square * np.exp(-loud)[:, None]).sum(axis=0) / free.sum(axis=0)
         apart = np.diff(self.place[1:])
         shape = _smooth(
-            np.log(np.maximum(even, MIN_POWER)), free.sum(axis=0), apart, None
+            np.log(np.maximum(even, tolerances.MIN_POWER)),
+            free.sum(axis=0),
+            apart,
+            None,
         )
         channels = zip(raw, free, loud, strict=True)
         levels = [_smooth(own, dof, apart, shape + mean) for own, dof, mean in channels]
@@ -116,11 +105,13 @@ class Bands:
 
     def _with_mean_level(self, level: Array) -> Array:
         """Levels with that of the mean before them."""
-        near = self.place[1:] < self.place[1] + SLOPE_REACH
+        near = self.place[1:] < self.place[1] + detections.SLOPE_REACH
         slope = 0.0
         if near.sum() > 1:
             slope = float(np.polyfit(self.place[1:][near], level[near], 1)[0])
-        steep = np.clip(-slope, 0.0, WALK_SLOPE) * (self.place[1] - self.place[0])
+        steep = np.clip(-slope, 0.0, detections.WALK_SLOPE) * (
+            self.place[1] - self.place[0]
+        )
         return np.concatenate([[level[0] + steep], level])
 
     def power(self, levels: Array, frequency: Array) -> Array:
@@ -132,19 +123,21 @@ class Bands:
 
 def _smooth(raw: Array, free: Array, apart: Array, about: Array | None) -> Array:
     """Ln of the mean power of (1), (b,); `about` are a + S_b, where that is known."""
-    stiff = 1 / (USUAL_SLOPE**2 * np.maximum(apart, MIN_LOG_DISTANCE))
-    near = 0.0 if about is None else AXES_LOG_SPREAD**-2
+    stiff = 1 / (
+        priors.NOISE_SLOPE**2 * np.maximum(apart, tolerances.MIN_LOG_FREQUENCY)
+    )
+    near = 0.0 if about is None else priors.NOISE_AXES_LOG_SPREAD**-2
     middle = raw if about is None else about
     level = middle.copy()
     inner = np.diag(np.append(stiff, 0.0) + np.append(0.0, stiff) + near)
     inner -= np.diag(stiff, 1) + np.diag(stiff, -1)
     bend = inner
-    for _ in range(MAX_NEWTON_STEPS):
+    for _ in range(tolerances.MAX_ITERATIONS):
         ratio = np.exp(np.clip(raw - level, -20.0, 3.0))
         slope = free / 2 * (1 - ratio) + inner @ level - near * middle
         bend = inner + np.diag(free / 2 * np.maximum(ratio, 0.2))
         step = np.clip(np.linalg.solve(bend, slope), -2.0, 2.0)
         level = level - step
-        if np.abs(step).max() < CONVERGED:
+        if np.abs(step).max() < tolerances.ACCUMULATED_ROUNDING:
             break
     return level + np.diag(np.linalg.inv(bend)) / 2

@@ -19,24 +19,9 @@ from itertools import groupby
 import numpy as np
 
 from fieldcal.core.samples import GYR, Array, Mask
+from fieldcal.model import detections
 from fieldcal.model.rows.averages import Rows
 from fieldcal.windows.noise import is_to_and_fro, quickest_noise
-
-WANDER_SIGMAS = 6.0
-"""Standard deviations of what the squares across the force have too many."""
-
-MIN_HELD_WINDOWS = 4
-"""Windows of a device in a hand; what lies still for long drifts by itself."""
-
-ACROSS_RATIO = 1.5
-"""And by how much more than along the force."""
-
-MIN_QUIET_SHARE = 0.25
-"""Share of the windows that show no more than the sensors' own noise."""
-
-LYING_NOISE_RATIO = 3.0
-"""Times that noise which one shows in which the device lies still: in published
-recordings 2 at most on a table, 4 to 60 in a hand."""
 
 
 def trembling_windows(rows: Rows, pieces: list[Array], rate: float) -> Mask:
@@ -44,14 +29,16 @@ def trembling_windows(rows: Rows, pieces: list[Array], rate: float) -> Mask:
 
     `pieces` are the (n_i, 6) samples of each, nan where missing, at `rate` Hz.
     """
-    if len(pieces) < MIN_HELD_WINDOWS:
+    if len(pieces) < detections.MIN_HELD_WINDOWS:
         return np.zeros(len(pieces), dtype=bool)
     shown = np.array([_relative_tremor(piece[:, GYR], rate) for piece in pieces])
     known = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
     if not known.any():
         return np.zeros(len(pieces), dtype=bool)
-    sensors = np.quantile(shown[:, known], MIN_QUIET_SHARE, axis=0)
-    apart: Mask = (shown[:, known] / sensors).mean(axis=1) > LYING_NOISE_RATIO
+    sensors = np.quantile(shown[:, known], detections.QUIET_SHARE, axis=0)
+    apart: Mask = (shown[:, known] / sensors).mean(
+        axis=1
+    ) > detections.LYING_NOISE_RATIO
     return apart
 
 
@@ -95,7 +82,7 @@ def noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array 
 
     `pieces` are the (n_i, 6) samples of windows, `least` (6,) the noise of rounding.
     """
-    free = ~rows.x.oriented.any() and len(pieces) >= MIN_HELD_WINDOWS
+    free = ~rows.x.oriented.any() and len(pieces) >= detections.MIN_HELD_WINDOWS
     if not free or not is_to_and_fro([piece[:, GYR] for piece in pieces]):
         return None
     # where a hand is quick, differences of samples show it as well
@@ -103,7 +90,7 @@ def noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array 
         [_high_frequency_noise(piece[:, GYR]) for piece in pieces]
     )
     loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
-    quiet = np.argsort(loud)[: max(round(MIN_QUIET_SHARE * len(pieces)), 1)]
+    quiet = np.argsort(loud)[: max(round(detections.QUIET_SHARE * len(pieces)), 1)]
     return np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
 
 
@@ -140,7 +127,7 @@ def force_wander_angle(rows: Rows) -> float:
     x, usable = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
     held = [usable & (x.position == p) for p in np.unique(x.position[usable])]
     held = [at for at in held if at.sum() > 1]
-    if len(held) < MIN_HELD_WINDOWS:
+    if len(held) < detections.MIN_HELD_WINDOWS:
         return 0.0
     offs = [rows.y[at, :3] - rows.y[at, :3].mean(axis=0) for at in held]
     squares, angle = list[tuple[float, float, float]](), []
@@ -154,7 +141,9 @@ def force_wander_angle(rows: Rows) -> float:
         length = np.linalg.norm(rows.y[at, :3].mean(axis=0))
         angle.append(((off - part) ** 2).sum() / (2 * free) / length**2)
     across, along, dof = np.sum(sorted(squares, key=lambda s: s[0] / s[2])[:-1], axis=0)
-    if across / 2 < max(dof + WANDER_SIGMAS * np.sqrt(dof), ACROSS_RATIO * along):
+    if across / 2 < max(
+        dof + detections.WANDER_SIGMAS * np.sqrt(dof), detections.ACROSS_RATIO * along
+    ):
         return 0.0
     return float(np.sqrt(np.mean(angle)))
 

@@ -24,16 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-
-STEADY_HAND_K, WALKING_HAND_K = 2.0, 15.0
-"""k of a hand that does not drift, and of one that does as a random walk, with its
-standard deviation from one hand to the next."""
-
-MIN_SAMPLES = 10
-"""Samples that tell a slope and its noise."""
-
-MAX_STEPS = 30
-"""Until k stays to a thousandth."""
+from fieldcal.model import detections, priors, tolerances
 
 
 class ForceTurn(NamedTuple):
@@ -61,7 +52,7 @@ def force_turn_rate(acc: Array, length: float) -> ForceTurn:
     """
     known = np.isfinite(acc).all(axis=1)
     t = (np.linspace(-0.5, 0.5, len(acc)) * length)[known]
-    if len(t) < MIN_SAMPLES:
+    if len(t) < detections.MIN_DRIFT_SAMPLES:
         return ForceTurn(0.0, np.inf)
     t -= t.mean()
     measured = acc[known]
@@ -88,12 +79,14 @@ def drift_factor(windows: list[ForceTurn], trembles: Array) -> float:
     square, noise = np.array(windows).T
     usable = np.isfinite(noise) & (trembles > 0)
     square, noise, trembles = square[usable], noise[usable], trembles[usable]
-    k = WALKING_HAND_K
-    for _ in range(MAX_STEPS):
+    k = priors.WALKING_HAND_K
+    for _ in range(tolerances.MAX_ITERATIONS):
         # the square of a normal rate about two axes scatters by itself
         info = 1 / (noise + k * trembles) ** 2
         squares = float(info @ trembles**2)
         product = float(info @ (trembles * (square - noise)))
-        k = (product + 1 / WALKING_HAND_K) / (squares + 1 / WALKING_HAND_K**2)
-        k = max(k, STEADY_HAND_K)
+        k = (product + 1 / priors.WALKING_HAND_K) / (
+            squares + 1 / priors.WALKING_HAND_K**2
+        )
+        k = max(k, priors.STEADY_HAND_K)
     return k

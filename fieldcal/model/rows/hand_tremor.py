@@ -34,6 +34,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import detections, priors
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.hand_detection import (
@@ -42,20 +43,11 @@ from fieldcal.model.rows.hand_detection import (
     trembling_windows,
     tremor_rms,
 )
-from fieldcal.model.rows.hand_drift import (
-    STEADY_HAND_K,
-    ForceTurn,
-    drift_factor,
-    force_turn_rate,
-)
+from fieldcal.model.rows.hand_drift import ForceTurn, drift_factor, force_turn_rate
 from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.reduce import median_sigma, reduce_to_rows
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
-
-PUSHED_NOISE_RATIO = 1.5
-"""Times their quickest noise that accelerometers show where a hand pushes the device:
-on a table that trembles 1.3 at most in published recordings."""
 
 
 def rows_of_recording(source: RowSource) -> Rows:
@@ -74,7 +66,9 @@ def rows_of_recording(source: RowSource) -> Rows:
         in_hand = _add_hand_motion(
             source, reduce_to_rows(source, whole=True, level=noise), angle
         )
-        pushed = (rows.noise[:3] > PUSHED_NOISE_RATIO * in_hand.noise[:3]).any()
+        pushed = (
+            rows.noise[:3] > detections.PUSHED_NOISE_RATIO * in_hand.noise[:3]
+        ).any()
         return in_hand if angle or pushed else _separate_triads(source, in_hand)
     trembling = trembling_windows(rows, pieces, source.rate)
     if not trembling.any():
@@ -106,13 +100,15 @@ def _add_hand_motion(
     square = np.where(known, turned, 0.0) ** 2
     trembles = square.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     k = drift_factor(turns, trembles / length**2)
-    slow = np.sqrt(STEADY_HAND_K * angle**2 + k * turned**2) / length[:, None]  # (1)
+    slow = (
+        np.sqrt(priors.STEADY_HAND_K * angle**2 + k * turned**2) / length[:, None]
+    )  # (1)
     sd[held, 3:] = np.hypot(sd[held, 3:], slow * rate_unit)
-    fast = np.sqrt(STEADY_HAND_K) * (pushed / length)[:, None] * unit  # (1)
+    fast = np.sqrt(priors.STEADY_HAND_K) * (pushed / length)[:, None] * unit  # (1)
     sd[held, :3] = np.hypot(sd[held, :3], fast)
     # difference between the angle at the end of a rest and the mean angle
     some, wander = np.where(known, square, trembles[:, None]), np.zeros_like(sd[:, 3:])
-    wander[held] = np.sqrt(np.maximum(angle**2, k / STEADY_HAND_K * some))
+    wander[held] = np.sqrt(np.maximum(angle**2, k / priors.STEADY_HAND_K * some))
     return replace(rows, sd=sd, hand_angle=wander)
 
 

@@ -10,9 +10,7 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from fieldcal.core.samples import Array
-
-RESTART_INTERVALS = 3.5
-"""Intervals between knots, or samples, from which there is a pause."""
+from fieldcal.model import detections
 
 
 def even_times(t: Array, step: float) -> Array:
@@ -24,7 +22,7 @@ def even_times(t: Array, step: float) -> Array:
     step : s from one instant to the next, as nearly as the pieces between pauses allow
 
     """
-    breaks = np.flatnonzero(np.diff(t) > RESTART_INTERVALS * step) + 1
+    breaks = np.flatnonzero(np.diff(t) > detections.PAUSE_INTERVALS * step) + 1
     even = [
         np.linspace(some[0], some[-1], max(round((some[-1] - some[0]) / step), 1) + 1)
         for some in np.split(t, breaks)

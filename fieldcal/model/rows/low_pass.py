@@ -33,13 +33,10 @@ from scipy.interpolate import CubicSpline, PPoly
 from scipy.linalg import get_lapack_funcs
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.knots import RESTART_INTERVALS, even_times, hermite_spline
+from fieldcal.model import detections, resolutions, tolerances
+from fieldcal.model.rows.knots import even_times, hermite_spline
 
 ROOT2 = np.sqrt(2)
-
-QUADRATURE_NODES, FORGOTTEN_EXPONENT = 48, 40.0
-"""Of the integral of a cubic from one instant to the next, times the exponential, and
-the exponent from which on that has nothing left."""
 
 
 def first_order(spline: PPoly, tau: float) -> PPoly:
@@ -107,7 +104,7 @@ def _filter_state(t: Array, u: Array, change: Array, pole: complex) -> Any:
     """Z of (4) at the knots, (n, k), from rest after every pause."""
     out = np.empty(u.shape, dtype=np.result_type(pole, float))
     steps = np.diff(t)
-    pauses = np.flatnonzero(steps > RESTART_INTERVALS * np.median(steps)) + 1
+    pauses = np.flatnonzero(steps > detections.PAUSE_INTERVALS * np.median(steps)) + 1
     for some in np.split(np.arange(len(t)), pauses):
         step = float(np.mean(np.diff(t[some]))) if len(some) > 1 else 0.0
         out[some] = _from_rest(u[some], change[some], step, pole)
@@ -117,8 +114,8 @@ def _filter_state(t: Array, u: Array, change: Array, pole: complex) -> Any:
 def _from_rest(u: Array, change: Array, step: float, pole: complex) -> Any:
     """Z of (4) at even instants of an input with a derivative, (n, k)."""
     keep = np.exp(pole * step)
-    place, weight = np.polynomial.legendre.leggauss(QUADRATURE_NODES)
-    part = min(1.0, FORGOTTEN_EXPONENT / max(-pole.real * step, 1e-300))
+    place, weight = np.polynomial.legendre.leggauss(resolutions.QUADRATURE_NODES)
+    part = min(1.0, tolerances.FORGOTTEN_EXPONENT / max(-pole.real * step, 1e-300))
     x = 1 - (1 - place) / 2 * part
     weight = weight / 2 * part * step * np.exp(pole * step * (1 - x))
     # Hermite's cubics: values and derivatives at both ends

@@ -30,23 +30,13 @@ from scipy.fft import dct, idct, prev_fast_len
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index, Mask
-from fieldcal.model.rows.knots import RESTART_INTERVALS
-from fieldcal.model.rows.reference import MIN_CHANNEL_SAMPLES, Reference
+from fieldcal.model import detections, resolutions, tolerances
+from fieldcal.model.rows.reference import Reference
 from fieldcal.model.rows.response import Response
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
 
 TRIADS = (ACC, GYR)
-
-STAMP_ROUNDING = 1e-6
-"""Part of the interval of samples by which rounding has stamps be off even times."""
-
-KNOTS_PER_ROW = 4
-"""Knots in each row of the reference's mean over a row, if it has as many samples: what
-is left after that mean is smooth between them."""
-
-RECORDING_PARTS = 8
-"""Parts of a recording, of whole stretches, that something may happen to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +116,7 @@ class MotionRows:
     def part(self) -> Index:
         """Number of the part of the recording that each row lies in, (n,)."""
         count = len(self) // self.length
-        return self.stretch * min(RECORDING_PARTS, count) // count
+        return self.stretch * min(resolutions.RECORDING_PARTS, count) // count
 
     @property
     def middles(self) -> Array:
@@ -250,7 +240,7 @@ def common_samples(block: Block, reference: Reference) -> Block:
 def _compared_channels(block: Block, reference: Reference) -> Mask:
     """Measured channels of the triads of which the reference has any, (6,)."""
     told = np.repeat(reference.observed.reshape(2, 3).any(axis=1), 3)
-    measured = np.isfinite(block.six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
+    measured = np.isfinite(block.six).sum(axis=0) >= detections.MIN_SAMPLES
     compared: Mask = told & measured
     return compared
 
@@ -280,7 +270,9 @@ def rows_in_motion(
     good &= reference.covers(alignment.reference_time(block.t), margin)
     kept = np.flatnonzero(good)
     step = float(np.median(np.diff(block.t)))
-    broken = (np.diff(block.t[kept]) > RESTART_INTERVALS * step) | (np.diff(kept) > 1)
+    broken = (np.diff(block.t[kept]) > detections.PAUSE_INTERVALS * step) | (
+        np.diff(kept) > 1
+    )
     length = max(int(stretch_s / step / per_row), 1)
     length = prev_fast_len(length, real=True)  # a prime one costs five times as much
     stretches = [
@@ -295,7 +287,7 @@ def rows_in_motion(
         warming = np.full(len(at), np.nan)  # its noise is no change
     stamps, uneven = block.t[at], _stamp_errors(block.t, stretches).reshape(at.shape)
     taken = stamps
-    between = step * per_row / KNOTS_PER_ROW
+    between = step * per_row / resolutions.KNOTS_PER_ROW
     if not uneven.any() and reference.step <= between:
         lasts = step * (1 + alignment.drift)  # by the clock of the reference, (1)
         reference = reference.averaged_over(lasts * _centred(per_row), between)
@@ -325,4 +317,4 @@ def _stamp_errors(t: Array, stretches: Sequence[Index]) -> Array:
             off.append(stamps - count * (count @ stamps) / max(count @ count, 1.0))
     out: Array = np.concatenate(off)
     step = float(np.median(np.diff(t)))
-    return np.where(np.abs(out) > STAMP_ROUNDING * step, out, 0.0)
+    return np.where(np.abs(out) > tolerances.STAMP_ROUNDING * step, out, 0.0)

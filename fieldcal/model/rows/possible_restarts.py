@@ -10,23 +10,9 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import sampling_rate
+from fieldcal.model import detections, priors, thresholds
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
-
-MIN_GAP_S, MIN_GAP_PERIODS = 0.5, 5.0
-"""Time, and periods of the samples, without any in which a device may restart."""
-
-COUNTERS = (2.0**8, 2.0**16, 2.0**32)
-"""Numbers that a counter of samples may have before it begins again."""
-
-ARRIVAL_S = 0.1
-"""Uncertainty of the time between two samples, s: a host may stamp them late."""
-
-RATE_ERROR = 1e-3
-"""Relative uncertainty of the rate of samples: it changes with the temperature."""
-
-MAX_CHANCE = 0.01
-"""Largest chance that a counter which began anew looks as if it had gone on."""
 
 
 def possible_restarts(block: Block, about: Description) -> list[tuple[float, float]]:
@@ -34,7 +20,7 @@ def possible_restarts(block: Block, about: Description) -> list[tuple[float, flo
     bound = window_bounds(block, about)
     held = bound[bound[:, 1] > bound[:, 0]]
     held = held[np.argsort(held[:, 0])]
-    least = max(MIN_GAP_S, MIN_GAP_PERIODS / sampling_rate(block))
+    least = max(detections.MIN_GAP_S, detections.MIN_GAP_PERIODS / sampling_rate(block))
     out = []
     for (_, end), (start, _) in zip(held[:-1], held[1:], strict=True):
         first = max(int(end) - 1, 0)
@@ -68,9 +54,13 @@ def counted_on(block: Block, i: int) -> bool:
     if np.median(steps) != 1.0:
         return False
     expected = (t[i + 1] - t[i]) * sampling_rate(block)
-    error = 1.0 + ARRIVAL_S * sampling_rate(block) + RATE_ERROR * expected
-    span = next((n for n in COUNTERS if seq.max() < n), np.inf)
+    error = (
+        1.0
+        + priors.SAMPLE_ARRIVAL_S * sampling_rate(block)
+        + priors.RATE_ERROR * expected
+    )
+    span = next((n for n in detections.COUNTERS if seq.max() < n), np.inf)
     off = steps[i] - expected
     if np.isfinite(span):
         off = (off + span / 2) % span - span / 2
-    return bool(abs(off) < error and (2 * error + 1) / span < MAX_CHANCE)
+    return bool(abs(off) < error and (2 * error + 1) / span < thresholds.LOOKED_AT)

@@ -15,10 +15,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
 from fieldcal.core.samples import Array, Block, Index, Mask
-from fieldcal.model.rows.knots import RESTART_INTERVALS, even_times, hermite_spline
-
-MIN_CHANNEL_SAMPLES = 8
-"""Samples of a channel from which a reference has it."""
+from fieldcal.model import detections
+from fieldcal.model.rows.knots import even_times, hermite_spline
 
 
 class Reference:
@@ -39,7 +37,7 @@ class Reference:
 
     def __init__(self, block: Block) -> None:
         six = block.six
-        self.observed = np.isfinite(six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
+        self.observed = np.isfinite(six).sum(axis=0) >= detections.MIN_SAMPLES
         whole = np.isfinite(six[:, self.observed]).any(axis=1)
         self.t, self.step = block.t[whole], float(np.median(np.diff(block.t[whole])))
         self.start, self.end = float(self.t[0]), float(self.t[-1])
@@ -108,4 +106,4 @@ class Reference:
         inside = (s > self.start + margin) & (s < self.end - margin)
         after = np.clip(np.searchsorted(self.t, s), 1, len(self.t) - 1)
         apart = self.t[after] - self.t[after - 1]
-        return inside & (apart < RESTART_INTERVALS * self.step)
+        return inside & (apart < detections.PAUSE_INTERVALS * self.step)

@@ -22,6 +22,8 @@ from typing import Self
 
 import numpy as np
 
+from fieldcal.core.samples import CHANNELS
+from fieldcal.model import detections
 from fieldcal.model.rows.low_pass import (
     ROOT2,
     first_order,
@@ -31,15 +33,7 @@ from fieldcal.model.rows.low_pass import (
 )
 from fieldcal.model.rows.reference import Reference
 
-MIN_TIME_CONSTANT_S = 2e-3
-"""Time constant of first order that hardly a motion of a body tells from a delay, s."""
-
-MIN_SECOND_ORDER_S = 0.015
-"""The same of second order, s: what tells it from a delay is a part (w tau)^3 / 2 of a
-motion at w, 7e-4 of one at 1 Hz."""
-
-
-SIX = range(6)
+SIX = range(len(CHANNELS))
 """All channels."""
 
 
@@ -82,8 +76,12 @@ class Response:
             sensed = sensed.filtered_by(partial(first_order, tau=tau))
         if second:
             sensed = sensed.filtered_by(partial(second_order, tau=second))
-        slope = partial(first_order_slope, tau=max(abs(tau), MIN_TIME_CONSTANT_S))
-        bend = partial(second_order_slope, tau=max(abs(second), MIN_SECOND_ORDER_S))
+        slope = partial(
+            first_order_slope, tau=max(abs(tau), detections.MIN_TIME_CONSTANT_S)
+        )
+        bend = partial(
+            second_order_slope, tau=max(abs(second), detections.MIN_SECOND_ORDER_S)
+        )
         own = sensed.select_channels(channels)
         return cls(
             late, tau, second, sensed, own.filtered_by(slope), own.filtered_by(bend),
@@ -116,21 +114,21 @@ class Response:
         if not tau:
             return 0.0
         now = self.tau
-        square = now * abs(now) + (abs(now) + max(abs(now), MIN_TIME_CONSTANT_S)) * (
-            tau - now
-        )  # (1)
+        square = now * abs(now) + (
+            abs(now) + max(abs(now), detections.MIN_TIME_CONSTANT_S)
+        ) * (tau - now)  # (1)
         return float(np.sign(square) * np.sqrt(abs(square)))
 
     def _second_towards(self, second: float) -> float:
         if not second:
             return 0.0
         now = self.second
-        step = 3 * max(abs(now), MIN_SECOND_ORDER_S) ** 2 * (second - now)
+        step = 3 * max(abs(now), detections.MIN_SECOND_ORDER_S) ** 2 * (second - now)
         return float(np.cbrt(now**3 + step))  # (2)
 
     def distance_to(self, other: Self) -> float:
         """Largest difference of the time constants, relative to the least ones."""
         return max(
-            abs(self.tau - other.tau) / MIN_TIME_CONSTANT_S,
-            abs(self.second - other.second) / MIN_SECOND_ORDER_S,
+            abs(self.tau - other.tau) / detections.MIN_TIME_CONSTANT_S,
+            abs(self.second - other.second) / detections.MIN_SECOND_ORDER_S,
         )

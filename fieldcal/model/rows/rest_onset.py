@@ -12,24 +12,17 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import sampling_rate
+from fieldcal.model import detections
 from fieldcal.model.rows.block_means import block_means
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 
-PIECE_S = 0.2
-"""Length of the means that are compared with that of the window, s."""
-MOVING_SIGMAS = 7.0
-"""Difference of a short mean from the window's that is motion, in standard errors."""
-
-MAX_REST_RATE, MAX_REST_FORCE = 2e-3, 0.05
-"""Differences that are never motion, however low the noise, rad/s and m/s^2."""
-
 
 def rest_instants(block: Block, about: Description, noise: Array) -> Array:
     """Instant from which the device was at rest in each position, (p,) s."""
     windows = window_bounds(block, about)
-    m = max(2, round(PIECE_S * sampling_rate(block)))
+    m = max(2, round(detections.MOTION_MEAN_S * sampling_rate(block)))
     out = np.full(len(windows), block.t[0])
     before = 0
     for p, (first, last) in enumerate(windows):
@@ -49,7 +42,8 @@ def _last_motion(gap: Array, held: Array, noise: Array, m: int) -> int:
     start = len(gap) - whole * m
     mean = gap[start:].reshape(whole, m, 6).mean(axis=1)
     limit = np.maximum(
-        MOVING_SIGMAS * noise / np.sqrt(m), [MAX_REST_FORCE] * 3 + [MAX_REST_RATE] * 3
+        detections.ONSET_SIGMAS * noise / np.sqrt(m),
+        [detections.MAX_REST_FORCE] * 3 + [detections.MAX_REST_RATE] * 3,
     )
     moving = np.abs(mean - held) > limit
     rated = bool(np.isfinite(mean[:, 3:]).all())

@@ -15,32 +15,7 @@ import numpy as np
 
 from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Block
-
-VALUE_HALF_SPANS_S = (12.0, 8.0, 5.0, 3.0)
-"""Half spans of the line for the value, the longest first; where each of them flattens
-the course, the means themselves are taken."""
-
-MAX_VALUE_MISFIT = 1.3
-"""Times the noise of the means that a line may leave of them; more is flat."""
-
-RATE_HALF_SPANS_S = (6.0, 10.0, 16.0, 25.0, 40.0)
-"""Half spans of the line for the rate: a longer one has less noise, and flattens what
-changes faster than it."""
-
-MAX_RATE_NOISE = 0.05
-"""Noise of the rate, of the rate's spread, that is allowed."""
-
-MAX_RATE_DIFFERENCE = 1.5
-"""Noise of the shorter span's rate that a longer one's may differ by; more is flat."""
-
-RIDGE = 1e-9
-"""Of a fit's own information, added where too few means lie in a span."""
-
-MAX_MEANS = 3600
-"""Means of the temperature of a recording, of a second or longer."""
-
-PAUSE_S = 60.0
-"""What of a pause without samples counts for the width of these steps, s."""
+from fieldcal.model import detections, resolutions, tolerances
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +47,7 @@ class Thermometer:
             return cls(t, np.array([np.nan]), np.array([np.nan]), np.nan, np.nan)
         t, mean, count = _means(block.t[known], block.temperature[known])
         step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-        allowed = MAX_VALUE_MISFIT * _scatter(mean, block.temperature[known])
+        allowed = detections.MAX_VALUE_MISFIT * _scatter(mean, block.temperature[known])
         value, trend, noise = _course(t, mean, count, allowed, step)
         slope = _rate(t, mean, count, noise)
         start = value[0] - trend * (t[0] - block.t[0])
@@ -108,12 +83,12 @@ def _course(
     t: Array, mean: Array, count: Array, allowed: float, step: float
 ) -> tuple[Array, float, float]:
     """Values over the longest span that flattens nothing; slope at the start; noise."""
-    for half in VALUE_HALF_SPANS_S:
+    for half in resolutions.VALUE_HALF_SPANS_S:
         value, slope = _line(t, mean, count, max(half, 4 * step))
         noise = float(np.std(mean - value))
         if noise <= allowed:
             return value, float(slope[0]), noise
-    return mean, float(slope[0]), allowed / MAX_VALUE_MISFIT
+    return mean, float(slope[0]), allowed / detections.MAX_VALUE_MISFIT
 
 
 def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:
@@ -125,14 +100,14 @@ def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:
     step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
     measure = best = np.zeros_like(t)
     allowed = 0.0
-    for half in RATE_HALF_SPANS_S:
+    for half in resolutions.RATE_HALF_SPANS_S:
         half = max(half, 4 * step)
         slope = _slope(t, mean, count, half)
         if allowed == 0.0:
             measure = best = slope
             error = noise * float(np.sqrt(12 * step / (2 * half) ** 3))
-            if error < MAX_RATE_NOISE * float(np.std(slope)):
-                allowed = MAX_RATE_DIFFERENCE * error
+            if error < detections.MAX_RATE_NOISE * float(np.std(slope)):
+                allowed = detections.MAX_RATE_DIFFERENCE * error
             continue
         if MAD_TO_SIGMA * float(np.median(np.abs(slope - measure))) > allowed:
             break
@@ -141,7 +116,11 @@ def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:
 
 
 def _means(t: Array, values: Array) -> tuple[Array, Array, Array]:
-    width = max(1.0, float(np.minimum(np.diff(t), PAUSE_S).sum()) / MAX_MEANS)
+    width = max(
+        1.0,
+        float(np.minimum(np.diff(t), tolerances.MAX_COUNTED_PAUSE_S).sum())
+        / tolerances.MAX_TEMPERATURE_MEANS,
+    )
     bins = ((t - t[0]) / width).astype(np.intp)
     first = np.concatenate([[0], np.flatnonzero(np.diff(bins)) + 1])
     count = np.diff(np.append(first, len(t))).astype(float)
@@ -196,6 +175,6 @@ def _slope_of_run(t: Array, y: Array, weight: Array, half: float) -> Array:
     right = about[:, :3, :3] @ near[:, 5:, None]
     scale = half ** np.add.outer(np.arange(3), np.arange(3))
     left = moments[:, np.add.outer(np.arange(3), np.arange(3))] / scale
-    left += RIDGE * left[:, :1, :1] * np.eye(3)
+    left += tolerances.SINGULAR * left[:, :1, :1] * np.eye(3)
     coefficients = np.linalg.solve(left, right / half ** np.arange(3)[:, None])
     return coefficients[:, 1, 0] / half

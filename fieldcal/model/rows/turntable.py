@@ -33,22 +33,9 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.positions import Position, table_rates, unknown_axis_speeds
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import detections, thresholds, tolerances
 from fieldcal.model.rows.block_means import mean_of_known
 from fieldcal.physics.experience import Experience
-
-MIN_REVOLUTIONS = 1.0
-"""Whole turns of a window from which what goes round is told from the mean."""
-
-MIN_AXES_SPREAD = 1e-3
-"""Least singular value of (3), of the largest, from which axes tell a bias."""
-
-MIN_POSITIONS, MIN_RESIDUAL_FALL = 6, 0.2
-"""Positions from which the Earth's rate is sought in them, and share by which what is
-left then may be longer or shorter: beyond, directions are not known well enough for
-what is linear about them."""
-
-EARTH_RATE_SIGMAS = 5.0
-"""Standard deviations by which something may seem larger than the Earth's rate."""
 
 
 def unknown_earth_rate(scale: Array | Sequence[float]) -> Array:
@@ -118,12 +105,12 @@ class GyroReadings:
             for p in np.unique(self.position)
             if not (self.positions[p].oriented or self.positions[p].on_turning_table)
         ]
-        if not (self.earth and len(free) >= MIN_POSITIONS):
+        if not (self.earth and len(free) >= detections.MIN_EARTH_POSITIONS):
             return out
         speed, _ = unknown_axis_speeds(self.positions)
         mean, known = self._pointing(speed)
         length = np.linalg.norm(mean[free], axis=1) / self.earth
-        if known and np.abs(length - 1).max() < MIN_RESIDUAL_FALL:
+        if known and np.abs(length - 1).max() < detections.MAX_EARTH_MISFIT:
             for p in free:
                 out[self.position == p] = self.earth * _unit(mean[p])
         return out
@@ -160,7 +147,7 @@ def _bias_from_norms(w: Array, length: Array) -> tuple[Array, bool]:
     size = float(np.abs(w).max(initial=1e-12))
     design = np.column_stack([2 * w / size, -np.ones(len(w))])
     squares = (np.sum(w**2, axis=1) - length**2) / size**2
-    solution, _, rank, _ = np.linalg.lstsq(design, squares, MIN_AXES_SPREAD)
+    solution, _, rank, _ = np.linalg.lstsq(design, squares, detections.MIN_AXES_SPREAD)
     if rank < design.shape[1]:
         return np.zeros(3), False
     return size * solution[:3], True
@@ -186,7 +173,7 @@ def fit_rotating_earth_rate(
     none = RotatingEarthRate(
         np.zeros_like(gyr), _unseen_rate_covariance(rate / speed, turned)
     )
-    if turned < 2 * np.pi * MIN_REVOLUTIONS or used.sum() < 3:
+    if turned < 2 * np.pi * detections.MIN_REVOLUTIONS or used.sum() < 3:
         return none
     shape = scale[:, None] * _unit_vectors(rate / speed, speed * (t - t[0]))
     shape *= np.broadcast_to(np.sinc(speed * length / (2 * np.pi)), t.shape)[
@@ -196,12 +183,14 @@ def fit_rotating_earth_rate(
     means = np.broadcast_to(np.eye(3), (int(used.sum()), 3, 3))
     design = np.concatenate([means, shape[used]], axis=2) * weight[:, :, None]
     design = design.reshape(-1, 5)
-    solution, _, rank, _ = np.linalg.lstsq(design, (gyr[used] * weight).ravel(), 1e-6)
+    solution, _, rank, _ = np.linalg.lstsq(
+        design, (gyr[used] * weight).ravel(), tolerances.UNDETERMINED
+    )
     if rank < design.shape[1]:
         return none
     covariance = np.linalg.inv(design.T @ design)[3:, 3:]
     sigma = float(np.sqrt(covariance.diagonal().max()))
-    if np.linalg.norm(solution[3:]) > EARTH_RATE + EARTH_RATE_SIGMAS * sigma:
+    if np.linalg.norm(solution[3:]) > EARTH_RATE + thresholds.DECIDES * sigma:
         return none
     mean = shape[used].mean(axis=0)
     return RotatingEarthRate(shape @ solution[3:], mean @ covariance @ mean.T)

@@ -15,30 +15,13 @@ import numpy as np
 
 from fieldcal.core.once import once_per_block
 from fieldcal.core.samples import Array, Block, Index, Mask
+from fieldcal.model import detections, tolerances
 from fieldcal.model.rows.noise import noise_of, rounding_noise
 from fieldcal.windows.noise import (
     ChannelNoise,
     converter_noise,
     short_lag_noise,
 )
-
-NOISIER_SIGNIFICANCE = 6.0
-"""Significance from which a window counts as noisier than the others."""
-
-MAX_LINES = 8
-"""Of one window at most."""
-
-LINE_POWER_RATIO = 30.0
-"""Power of a line, in those of its neighbours at the median."""
-
-LOWEST_HZ = 2.0
-"""What is slower may be the sensors' own."""
-
-MAX_SEARCHED_SAMPLES = 1 << 16
-"""Samples of a window in which lines are looked for."""
-
-FREQUENCY_STEPS = 4
-"""Of Gauss and Newton, to a line's frequency."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +95,9 @@ def _compare_windows(
     first = np.sort(own, axis=0)[(known - 1) // 4, np.arange(6)]  # nan comes last
     usual = np.fmax(first, finest)
     low = np.sqrt(usual**2 + coarser)
-    margin = NOISIER_SIGNIFICANCE / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
+    margin = detections.NOISIER_SIGMAS / np.sqrt(
+        np.maximum(np.diff(windows, axis=1), 2)
+    )
     louder = out > low * np.exp(margin)
     loud: Mask = np.any(louder, axis=1)
     quiet = ~loud & ~stands.any(axis=1)
@@ -159,9 +144,9 @@ def without_lines(piece: Array, rate_hz: float) -> Array:
     known: Mask = np.all(np.isfinite(piece), axis=1)
     t = np.arange(len(piece)) / rate_hz
     out = piece.copy()
-    if known.sum() < 64 or len(piece) > MAX_SEARCHED_SAMPLES:
+    if known.sum() < 64 or len(piece) > tolerances.SAMPLES_AT_ONCE:
         return out
-    for _ in range(MAX_LINES):
+    for _ in range(tolerances.MAX_LINES_OF_WINDOW):
         hz = _strongest_line_hz(out[known], rate_hz)
         if hz is None:
             break
@@ -175,13 +160,17 @@ def _strongest_line_hz(y: Array, rate_hz: float) -> float | None:
     taper = np.hanning(len(y))[:, None]
     power = np.abs(np.fft.rfft((y - y.mean(axis=0)) * taper, n, axis=0)) ** 2
     hz = np.fft.rfftfreq(n, 1 / rate_hz)
-    power = power[hz >= LOWEST_HZ]
+    power = power[hz >= detections.LOWEST_LINE_HZ]
     if not len(power):
         return None
     level = np.maximum(np.median(power, axis=0), 1e-300)
     total = (power / level).max(axis=1)
     at = int(np.argmax(total))
-    return float(hz[hz >= LOWEST_HZ][at]) if total[at] > LINE_POWER_RATIO else None
+    return (
+        float(hz[hz >= detections.LOWEST_LINE_HZ][at])
+        if total[at] > detections.LINE_POWER_RATIO
+        else None
+    )
 
 
 def _fit_line(t: Array, y: Array, known: Mask, hz: float) -> Array:
@@ -189,7 +178,7 @@ def _fit_line(t: Array, y: Array, known: Mask, hz: float) -> Array:
 
     Each counts by its own noise, which is what the fit leaves of it.
     """
-    for _ in range(FREQUENCY_STEPS):
+    for _ in range(tolerances.FREQUENCY_STEPS):
         design, amplitude = _fitted_waves(t, y, known, hz)
         left = (y - design @ amplitude)[known]
         rise = np.column_stack([-design[:, 2], design[:, 1]]) @ amplitude[1:]

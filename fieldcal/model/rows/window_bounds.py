@@ -11,16 +11,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from fieldcal.core.samples import Array, Block, Index
+from fieldcal.model import resolutions
 from fieldcal.session.description import Description
-
-TARGET_ROWS = 360
-"""Rows aimed at, over all windows."""
-
-MIN_WINDOW_ROWS, MAX_WINDOW_ROWS = 8, 120
-"""Rows of one window."""
-
-FIRST_S = 1.0
-"""Length of the first row of a window, in which settling changes fastest, s."""
 
 
 def window_bounds(block: Block, about: Description) -> Index:
@@ -43,16 +35,22 @@ def block_edges(start: float, end: float, windows: int) -> Array:
     """
     length = end - start
     count = int(
-        np.clip(TARGET_ROWS // max(windows, 1), MIN_WINDOW_ROWS, MAX_WINDOW_ROWS)
+        np.clip(
+            resolutions.TARGET_ROWS // max(windows, 1),
+            resolutions.MIN_WINDOW_ROWS,
+            resolutions.MAX_WINDOW_ROWS,
+        )
     )
-    if length <= count * FIRST_S:
-        return np.linspace(start, end, max(1, round(length / FIRST_S)) + 1)
+    if length <= count * resolutions.FIRST_ROW_S:
+        return np.linspace(
+            start, end, max(1, round(length / resolutions.FIRST_ROW_S)) + 1
+        )
     low, high = 1.0, 10.0
     for _ in range(60):
         ratio = (low + high) / 2
-        longer = FIRST_S * np.sum(ratio ** np.arange(count)) > length
+        longer = resolutions.FIRST_ROW_S * np.sum(ratio ** np.arange(count)) > length
         low, high = (low, ratio) if longer else (ratio, high)
-    lengths = FIRST_S * low ** np.arange(count)
+    lengths = resolutions.FIRST_ROW_S * low ** np.arange(count)
     out = start + np.concatenate([[0.0], np.cumsum(lengths)])
     out[-1] = end
     return out

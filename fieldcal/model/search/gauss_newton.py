@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
+from fieldcal.model import priors, tolerances
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Gram
@@ -67,17 +68,6 @@ def _effect_terms(members: Sequence[Member], values: Array) -> Iterator[Term]:
             parameters = np.zeros(len(group.effect.params))
             parameters[list(group.params)] = values[group.columns]
             yield Term(group.effect, parameters, group.shape, group.origin)
-
-
-MAX_NEWTON_STEPS = 6
-"""Steps of Gauss and Newton for one set."""
-
-MAX_STEP, MAX_ROTATION = 30.0, 1.0
-"""Longest step of a parameter, in its typical sizes, and of a position's rotation, rad:
-no device is as far off, and rows are not linear over more."""
-
-CONVERGED = 0.03
-"""Largest step of a column, in standard deviations, that counts as none."""
 
 
 class GaussNewton:
@@ -164,12 +154,12 @@ class GaussNewton:
     ) -> tuple[State, Array, Set]:
         """The state at the estimate of a set, by Gauss and Newton, and that set."""
         state, values = self._near_set_angles(state, self.pad(values), members)
-        for _ in range(MAX_NEWTON_STEPS):
+        for _ in range(tolerances.MAX_NEWTON_STEPS):
             settled, _ = self.estimate(state, values, members, sizes)
             sizes = settled.sizes
             before = values
             state, values = self._step_towards(settled, before)
-            if self.largest_step(settled, before, values) < CONVERGED:
+            if self.largest_step(settled, before, values) < tolerances.CONVERGED:
                 break
         return state, values, settled
 
@@ -207,8 +197,8 @@ class GaussNewton:
         """
         d = self.dictionary
         state, values = self.state_at_estimate(fitted)
-        most = MAX_STEP * d.typical
-        most[d.rotations] = MAX_ROTATION
+        most = priors.FREE_SIZE * d.typical
+        most[d.rotations] = priors.SMALL_ROTATION
         beyond = float((np.abs(values - before) / most).max())
         if beyond <= 1.0:
             return state, values

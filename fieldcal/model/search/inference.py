@@ -13,26 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.evidence.sets import Set, SetKey, Sets
 from fieldcal.model.evidence.sizing import Member, keys_of
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportional_offsets import proportional_causes
 from fieldcal.model.search.refinement import Refinement
-from fieldcal.model.search.selection import MIN_LOG_RISE, Search, is_exhausted
+from fieldcal.model.search.selection import Search, is_exhausted
 from fieldcal.model.search.starting_sets import starting_sets
 from fieldcal.model.search.variations import drop_superfluous
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows
-
-MAX_LINEARISATIONS = 8
-"""Largest number of linearisations; of sets that alternate, the likelier is kept."""
-
-TIME_CONSTANT_LOG_LOSS = 0.5
-"""Decrease of ln Z if a time constant is off by its own uncertainty."""
-
-MAX_KEPT_STEP = 1.0
-"""Largest step of a column, in standard deviations, after which rows of turns need not
-be linearised again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +154,7 @@ class Inference:
         members: tuple[Member, ...] = ()
         visited = set(visited_keys)
         earlier = dict.fromkeys(one.members for one in rivals)
-        for _ in range(MAX_LINEARISATIONS):
+        for _ in range(tolerances.MAX_LINEARISATIONS):
             if is_exhausted(best):
                 return self.hold(best.members)
             visited.add(Sets.key(best.members))
@@ -182,7 +173,7 @@ class Inference:
                 continue
             best = own
             next_state, next_values, _ = fit.settle(state, values, members, best.sizes)
-            if fit.largest_step(best, values, next_values) < MAX_KEPT_STEP:
+            if fit.largest_step(best, values, next_values) < thresholds.VISIBLE:
                 break
             state, values = next_state, next_values
         return InferenceResult(
@@ -262,5 +253,5 @@ def _own_if_no_better(
     if best.keys != keys_of(members):
         return None
     own = search.sets.evaluate(members, best.sizes)
-    rise = TIME_CONSTANT_LOG_LOSS if returned else MIN_LOG_RISE
+    rise = thresholds.SIGMA_LOG_LOSS if returned else thresholds.MIN_LOG_RISE
     return own if best.score <= own.score + rise else None

@@ -13,10 +13,9 @@ from typing import Self
 
 import numpy as np
 
-from fieldcal.core.samples import Array
-from fieldcal.model import priors
+from fieldcal.core.samples import ACC, CHANNELS, Array
+from fieldcal.model import priors, resolutions, thresholds
 from fieldcal.model.causes.cause import Cause, EqualWidthGroups, Group
-from fieldcal.model.causes.smooth import MAX_COSINES
 from fieldcal.model.evidence.eliminated import Eliminated, noticeable_gains
 from fieldcal.model.evidence.sets import Set, SetKey, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member, Sizes
@@ -132,15 +131,8 @@ def _moved(own: tuple[int, ...], *offered: tuple[int, ...]) -> tuple[int, ...]:
 OfferKey = tuple[SetKey, Sizes | None]
 """Key of a set, and the sizes to which its offers are restricted, if any."""
 
-FLICKER_OUTPUTS = 3
-"""Number of outputs of a group of flicker."""
-
-MIN_LOG_GAIN = 0.5
-"""Gain of ln L below which there is no offer, unless the cause is likely a priori: one
-parameter gains that much from noise."""
-
-MAX_LOG_DISTANCE = 12.0
-"""Largest distance of an offer from the best to be evaluated, ln."""
+FLICKER_OUTPUTS = len(CHANNELS[ACC])
+"""Outputs of a group of flicker: those of a triad."""
 
 
 class Offers:
@@ -213,7 +205,7 @@ class Offers:
 
         def is_shown(group: Group) -> bool:
             gains = free.gain_by_size(group.columns, group.typical)
-            return bool(gains.max() >= MIN_LOG_GAIN)
+            return bool(gains.max() >= thresholds.SIGMA_LOG_LOSS)
 
         return is_shown
 
@@ -240,7 +232,7 @@ class Offers:
         """
         group = offer.member[1]
         outputs = FLICKER_OUTPUTS if group.random else len(group.params)
-        if not outputs or len(group.columns) <= MAX_COSINES * outputs:
+        if not outputs or len(group.columns) <= resolutions.COSINES * outputs:
             return offer
         profile = LOG_DENSITY + table.state.gain_by_size(group.columns, group.typical)
         log_prior = self.sets.set_log_prior([*current.members, offer.member])
@@ -258,7 +250,9 @@ class Offers:
         best: list[BestVariants] = [{} for _ in levels]
         for alike, inner, rhs, top in self._gains.by_width(levels):
             at = alike.cause
-            least = MIN_LOG_GAIN - extra_log_odds(alike, log_prior_by_variant)
+            least = thresholds.SIGMA_LOG_LOSS - extra_log_odds(
+                alike, log_prior_by_variant
+            )
             level, number, gain = noticeable_gains(inner, rhs, top, least)
             profile, known = gain + LOG_DENSITY, alike.known[number]
             profile[known] = -np.inf
@@ -272,7 +266,7 @@ class Offers:
             for i, shares in log_prior_by_variant.items():
                 own = at[number] == i
                 evidence[own] += shares[alike.variant[number[own]]] - log_prior[i]
-            near = evidence > log_prior[at].min() - MAX_LOG_DISTANCE
+            near = evidence > log_prior[at].min() - thresholds.OFFERED_LOG_DISTANCE
             kept = (part[near].tolist() for part in (level, number, size, evidence))
             for i, m, v, added in zip(*kept, strict=True):
                 cause = self.sets.dictionary.causes[at[m]]

@@ -32,9 +32,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
+from fieldcal.model import tolerances
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.eliminated import (
-    MIN_EIGENVALUE,
     Eliminated,
     evidence_gains,
     gains_from_eigenvalues,
@@ -160,7 +160,7 @@ class _SeparateGroups(NamedTuple):
         own, right = inner[at[:, :, None], at[:, None, :]], rhs[at]
         strength, axes = np.linalg.eigh(own)
         top = np.diagonal(own, 0, 1, 2).max(axis=1, keepdims=True)
-        determined = strength > MIN_EIGENVALUE * np.maximum(top, 1e-300)
+        determined = strength > tolerances.SINGULAR * np.maximum(top, 1e-300)
         axes = axes * determined[:, None, :]
         strength = np.where(determined, strength, 0.0)
         along = (right[:, None, :] @ axes)[:, 0]
@@ -229,10 +229,6 @@ class _GroupsAfterOthers:
         return gain
 
 
-PAIRED_CAUSES = 16
-"""Causes of which pairs are tried."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class OfferedPair:
     """Two offers that are added to a set together.
@@ -261,7 +257,9 @@ def offered_pairs(
 
     Offers are also tried with all their parameters.
     """
-    narrow = [o for o in table.offers if not is_function(o.member)][:PAIRED_CAUSES]
+    narrow = [o for o in table.offers if not is_function(o.member)][
+        : tolerances.PAIRED_CAUSES
+    ]
     offers = [*narrow, *(o.with_all_parameters() for o in narrow)]
     count = len(narrow)
     widened = [a is not b for a, b in zip(narrow, offers[count:], strict=True)]

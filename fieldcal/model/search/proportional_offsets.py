@@ -23,9 +23,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.basis import General, RowView
-from fieldcal.model.causes.cause import MIN_WINDOWS, Cause, Group
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.unknown_causes import typical_unknown_sizes
 from fieldcal.model.evidence.eliminated import Eliminated
@@ -35,7 +35,10 @@ from fieldcal.model.evidence.sets import Set
 def proportional_causes(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:
     """Causes of proportional offsets, about the window offsets beside each set."""
     for part, observed in dictionary.triads:
-        if len(observed) < 2 or len(dictionary.window_positions) <= MIN_WINDOWS:
+        if (
+            len(observed) < 2
+            or len(dictionary.window_positions) <= thresholds.MIN_ALIKE
+        ):
             continue
         groups = []
         for fitted in sets:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.model import tolerances
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
@@ -128,7 +129,8 @@ class Refinement:
         """
         middle, down, up = scores
         step = float(np.log(FINEST))
-        curvature = max(2 * middle - down - up, 1e-6) / step**2
+        bend = max(2 * middle - down - up, tolerances.ACCUMULATED_ROUNDING)
+        curvature = bend / step**2
         moved = float(np.clip((up - down) / (2 * step * curvature), -step, step))
         top = at * float(np.exp(moved))
         cause, (group,) = self.fit.variants_near(*best[i], [top])

@@ -6,40 +6,22 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from fieldcal.model import thresholds
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.evidence.sets import Set, Sets, is_function
 from fieldcal.model.evidence.sizing import Member, Sizes
-from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offer, Offers
+from fieldcal.model.search.offers import Offer, Offers
 from fieldcal.model.search.pairs import OfferedPair, offered_pairs
 from fieldcal.model.search.variations import (
-    ALTERNATIVE_MARGIN,
     drop_superfluous,
     score_of,
     widen_outputs,
     with_all_parameters,
 )
 
-MIN_LOG_RISE = 0.02
-"""Largest rise of ln Z that counts as zero."""
-
-MAX_STEPS = 30
-"""Steps of one search."""
-
-MAX_CAUSES = 12
-"""Causes with which a search ends: rows that take as many are of something else than
-this model, as of windows in which the device was turned, and each further one is paid
-with seconds. Recordings with known causes have up to four."""
-
-EVALUATED_OFFERS = 4
-"""Offers that are evaluated in full, at each step."""
-
-PREDICTION_SLACK = 3.0
-"""Log evidence that a full evaluation may add to the predicted score of an offer."""
-
 
 def is_exhausted(best: Set) -> bool:
     """Whether a search ended at a set of so many causes that none of them counts."""
-    return len(best.members) >= MAX_CAUSES
+    return len(best.members) >= thresholds.MAX_CAUSES
 
 
 class Search:
@@ -65,7 +47,7 @@ class Search:
                 self._with_usual_causes,
             ]
         best = self.sets.evaluate(start)
-        for _ in range(MAX_STEPS):
+        for _ in range(tolerances.MAX_ITERATIONS):
             better = self._step(best, changes)
             if better is best:
                 break
@@ -102,7 +84,7 @@ class Search:
         """The set after the first change that raises its weight, or the set itself."""
         for change in changes:
             better = change(current)
-            if better.score > current.score + MIN_LOG_RISE:
+            if better.score > current.score + thresholds.MIN_LOG_RISE:
                 return better
         return current
 
@@ -118,7 +100,7 @@ class Search:
         offers = self.offers.ranked(current, other_sizes)
         tried = [current]
         for offer in _leading(offers):
-            if offer.score > level - PREDICTION_SLACK:
+            if offer.score > level - thresholds.PREDICTION_SLACK:
                 tried.append(self.offers.accept(current, offer))
         return max(tried, key=score_of)
 
@@ -128,7 +110,7 @@ class Search:
         The set itself if none comes near a level, which is its own weight if not given.
         """
         level = current.score if level is None else level
-        least = level - 2 * PREDICTION_SLACK
+        least = level - 2 * thresholds.PREDICTION_SLACK
         best: dict[tuple[str, str], OfferedPair] = {}
         for table in self.offers.tables(current):
             if table.instability == current.sizes.instability:
@@ -139,7 +121,7 @@ class Search:
         ranked = sorted(best.values(), key=lambda pair: -pair.score)
         tried = [
             self.offers.accept(current, pair.first, pair.second)
-            for pair in ranked[:EVALUATED_OFFERS]
+            for pair in ranked[: tolerances.EVALUATED]
             if pair.score > least
         ]
         return max(tried, key=score_of, default=current)
@@ -165,7 +147,7 @@ class Search:
         Beside a cause that is not there, another may stand for what it lacks: beside a
         jump of a bias a wrong angle of the next position, where the device has slipped.
         """
-        tried, level = [current], current.score - ALTERNATIVE_MARGIN
+        tried, level = [current], current.score - thresholds.ALTERNATIVE_LOG_DISTANCE
         for i, (cause, _) in enumerate(current.members):
             reduced = self.sets.without(current, i)
             for offer in _leading(self.offers.ranked(reduced, current.sizes)):
@@ -208,7 +190,7 @@ class Search:
             return current
         tried = [current]
         complete = self.sets.evaluate((*current.members, *missing))
-        level = current.score - ALTERNATIVE_MARGIN
+        level = current.score - thresholds.ALTERNATIVE_LOG_DISTANCE
         for i, (cause, _) in enumerate(complete.members):
             if cause.key in unusual:
                 reduced = self.sets.without(complete, i)
@@ -241,6 +223,6 @@ def _leading(offers: Sequence[Offer]) -> list[Offer]:
     """The best of ranked offers, as far as they are near the best one."""
     return [
         offer
-        for offer in offers[:EVALUATED_OFFERS]
-        if offer.score > offers[0].score - MAX_LOG_DISTANCE
+        for offer in offers[: tolerances.EVALUATED]
+        if offer.score > offers[0].score - thresholds.OFFERED_LOG_DISTANCE
     ]

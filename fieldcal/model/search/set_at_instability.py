@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from fieldcal.core.samples import Array
-from fieldcal.model import priors
+from fieldcal.model import priors, resolutions
 from fieldcal.model.causes.cause import CLOSURE, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
@@ -21,21 +21,8 @@ from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes
 InstabilityIndices = tuple[int, ...]
 """Indices of instabilities in `priors.SIZES`, (7,)."""
 
-INSTABILITY_STEPS_DOWN = (3, 6, 9, 40)
-"""Steps of `priors.SIZES` by which the instability may decrease when a cause explains
-it: by factors of 6, 32 and 180, and to the smallest size."""
-
 LOWERED_TOGETHER = ((0, 1, 2), (3, 4, 5, 6))
 """Instabilities that decrease together: of a triad; closures with the gyroscopes."""
-
-RAISED_CLOSURES = (UNIT_INDEX + 1, UNIT_INDEX + 5)
-"""Sizes to which the instability of closures may rise when that of the accelerometers
-decreases, since errors of closures come from both: one step above the typical size, and
-ten times it."""
-
-FLICKER_STEPS_DOWN = (1, 2)
-"""Steps of `priors.SIZES` by which the size of flicker may decrease when a cause
-explains it: at its full size, flicker explains most of a random walk."""
 
 
 def tried_instabilities(
@@ -49,13 +36,16 @@ def tried_instabilities(
         return list(dict.fromkeys([instability, other]))
     tried = [instability]
     for lowered in LOWERED_TOGETHER if typical.any() else ():
-        for down in INSTABILITY_STEPS_DOWN:
+        for down in resolutions.INSTABILITY_STEPS_DOWN:
             tried.append(lowered_instability(instability, lowered, down))
     acc = LOWERED_TOGETHER[0]
     if typical[CLOSURE] and max(instability[c] for c in acc) > UNIT_INDEX:
-        steady = lowered_instability(instability, acc, INSTABILITY_STEPS_DOWN[-1])
+        steady = lowered_instability(
+            instability, acc, resolutions.INSTABILITY_STEPS_DOWN[-1]
+        )
         tried += [
-            steady[:CLOSURE] + (max(steady[CLOSURE], up),) for up in RAISED_CLOSURES
+            steady[:CLOSURE] + (max(steady[CLOSURE], UNIT_INDEX + up),)
+            for up in resolutions.CLOSURE_STEPS_UP
         ]
     return list(dict.fromkeys(tried))
 
@@ -142,7 +132,11 @@ def _smaller_permanent_groups(
     for i, group in enumerate(dictionary.always):
         if group.fixed_size is None and (group.changes_together or not group.in_state):
             # flicker is what few windows have instead of instability
-            down = [max(sizes[i] - d, 0) for d in FLICKER_STEPS_DOWN if group.random]
+            down = [
+                max(sizes[i] - d, 0)
+                for d in resolutions.FLICKER_STEPS_DOWN
+                if group.random
+            ]
             for smaller in dict.fromkeys([*down, 0]):
                 yield [*sizes[:i], smaller, *sizes[i + 1 :]]
 

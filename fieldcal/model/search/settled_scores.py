@@ -11,15 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.model import thresholds, tolerances
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.search.inference import InferenceResult
-from fieldcal.model.search.variations import ALTERNATIVE_MARGIN
-
-VISIBLE_ERROR = 1.0
-"""Error of a linearised mean that shows, in its standard deviations."""
-
-MAX_SETTLED_SETS = 4
-"""Largest number of states about which sets are evaluated."""
 
 
 def correct_scores(found: InferenceResult) -> None:
@@ -29,14 +23,14 @@ def correct_scores(found: InferenceResult) -> None:
     """
     sets, best = found.search.sets, found.best
     near = [s for s in sets.visited.values()
-            if s.score > best.score - ALTERNATIVE_MARGIN]  # fmt: skip
+            if s.score > best.score - thresholds.ALTERNATIVE_LOG_DISTANCE]  # fmt: skip
     settled, known = 0, {best.keys_in_state}
     for visited in sorted(near, key=lambda s: -s.score):
         keys = visited.keys_in_state
-        if keys in known or settled == MAX_SETTLED_SETS:
+        if keys in known or settled == tolerances.EVALUATED:
             continue
         known.add(keys)
-        if linearisation_error(found, visited) > VISIBLE_ERROR:
+        if linearisation_error(found, visited) > thresholds.VISIBLE:
             settled += 1
             sets.corrections[keys] = _settled_score(found, visited) - visited.score
 

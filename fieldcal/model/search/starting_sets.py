@@ -12,7 +12,7 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import GYR
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Set
@@ -24,9 +24,6 @@ from fieldcal.model.search.variations import score_of
 from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.physics.attitude_step import AttitudeStep
-
-LARGE_INSTABILITY = 4.0
-"""Instability, in typical ones, above which causes may hide that show only together."""
 
 
 def starting_sets(fit: GaussNewton, search: Search, best: Set) -> Iterator[Set]:
@@ -43,7 +40,7 @@ def starting_sets(fit: GaussNewton, search: Search, best: Set) -> Iterator[Set]:
     usual = tuple((c, c.variants[0]) for c in fit.dictionary.causes if c.usual)
     keys = {c.key for c, _ in usual}
     instability = priors.SIZES[list(best.sizes.instability)]
-    if (instability.max() > LARGE_INSTABILITY and not keys <= best.keys) or (
+    if (instability.max() > thresholds.LARGE_INSTABILITY and not keys <= best.keys) or (
         _turns_need_usual_causes(fit.turn_rows, best, keys)
     ):
         yield search.sets.evaluate(usual)

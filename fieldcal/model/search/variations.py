@@ -6,14 +6,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
-
-ALTERNATIVE_MARGIN = 6.0
-"""Largest predicted distance of alternatives, other parameters or causes, to be
-evaluated, ln."""
 
 
 def drop_superfluous(sets: Sets, members: tuple[Member, ...]) -> Set:
@@ -34,7 +31,7 @@ def visit_variations(sets: Sets, current: Set, top: float) -> None:
     An angle that was set wrongly may be that of another position. Only sets are visited
     that are predicted near the weight `top`.
     """
-    least = top - ALTERNATIVE_MARGIN
+    least = top - thresholds.ALTERNATIVE_LOG_DISTANCE
     for i, (cause, group) in enumerate(current.members):
         variations = _variations(sets, current, cause, group)
         if not variations:

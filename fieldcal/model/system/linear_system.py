@@ -17,7 +17,7 @@ from typing import Self
 import numpy as np
 
 from fieldcal.core.samples import Array, Index, Mask
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.basis import Course
 from fieldcal.model.causes.cause import CLOSURE, Basis
 from fieldcal.model.causes.dictionary import Dictionary
@@ -27,11 +27,6 @@ from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.turn_rows import TurnRows
-
-MIN_VISIBLE_SIGMAS = 1.0
-"""Least size of a column that rows show, in standard deviations of all rows together,
-for a parameter of typical size."""
-
 
 Parts = dict[int, list[tuple[Index, Array]]]
 """For each channel: columns with influence on it, and their values, (n, k)."""
@@ -96,7 +91,7 @@ class System(ABC):
     def _shows(self, part: LinearRows) -> Mask:
         """Whether each column of a channel exceeds the noise at typical size, (k,)."""
         typical = self.dictionary.typical[part.columns]
-        shows: Mask = np.linalg.norm(part.design, axis=0) * typical > MIN_VISIBLE_SIGMAS
+        shows: Mask = np.linalg.norm(part.design, axis=0) * typical > thresholds.VISIBLE
         return shows
 
     def _parts(self, table_of: Callable[[Basis], Array], wanted: Mask) -> Parts:

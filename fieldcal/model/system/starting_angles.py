@@ -11,19 +11,10 @@ import numpy as np
 
 from fieldcal.core.frames import in_procedure_axes, wrap_angle
 from fieldcal.core.samples import ACC, Array
+from fieldcal.model import resolutions, thresholds
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
-
-CONVERGES_WITHIN = 0.3
-"""Error of an angle from which the linearisation converges to the right one, rad."""
-
-GRID_STEP_DEG = 15.0
-"""Step of the angles that are tried; half of it is within `CONVERGES_WITHIN`."""
-
-ALIKE_FORCES = 0.05
-"""Difference of two forces' errors below which the smaller turn is likelier, of
-gravity."""
 
 
 def starting_angles(rows: Rows, nominal: State, position: int) -> Array:
@@ -46,16 +37,16 @@ def starting_angles(rows: Rows, nominal: State, position: int) -> Array:
         apart: Array = np.linalg.norm(off[:, axes], axis=1) / x.gravity
         return apart
 
-    if errors(stated[None])[0] <= CONVERGES_WITHIN:
+    if errors(stated[None])[0] <= thresholds.CONVERGES_WITHIN_RAD:
         return np.zeros(2)
     others = _stated_elsewhere(x, position)
     off = errors(others)
-    if len(others) and off.min() <= CONVERGES_WITHIN:
+    if len(others) and off.min() <= thresholds.CONVERGES_WITHIN_RAD:
         nearest: Array = _turn(stated, others)[off.argmin()]
         return nearest
     grid = _grid()
     off = errors(grid)
-    likely = _turn(stated, grid[off <= off.min() + ALIKE_FORCES])
+    likely = _turn(stated, grid[off <= off.min() + thresholds.ALIKE_FORCES])
     least: Array = likely[np.abs(likely).sum(axis=1).argmin()]
     return least
 
@@ -80,8 +71,10 @@ def _turn(stated: Array, angles: Array) -> Array:
 
 def _grid() -> Array:
     """All orientations in steps, (k, 2) rad."""
-    alpha = np.arange(-180.0, 180.0, GRID_STEP_DEG)
-    beta = np.arange(-90.0, 90.0 + GRID_STEP_DEG / 2, GRID_STEP_DEG)
+    alpha = np.arange(-180.0, 180.0, resolutions.GRID_STEP_DEG)
+    beta = np.arange(
+        -90.0, 90.0 + resolutions.GRID_STEP_DEG / 2, resolutions.GRID_STEP_DEG
+    )
     pairs = np.meshgrid(alpha, beta, indexing="ij")
     grid: Array = np.deg2rad(np.stack(pairs, axis=-1).reshape(-1, 2))
     return grid

@@ -17,7 +17,7 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds, tolerances
 from fieldcal.model.causes.basis import RowView
 from fieldcal.model.causes.cause import triads_of
 from fieldcal.model.causes.dictionary import Dictionary
@@ -37,10 +37,6 @@ from fieldcal.model.turns.attitude import turn_geometry
 from fieldcal.model.turns.turn import Turn
 from fieldcal.model.turns.turn_tracker import TurnTracker, apply_way_effects
 from fieldcal.physics.experience_rows import select_rows
-
-MAX_WAY_CHI2 = 3.0
-"""Mean square of a row on the way, after a fit of all columns, above which a hand shook
-the device and the rows on the way are not used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,8 +269,8 @@ def _drop_shaken_way(rows: list[TurnRows]) -> list[TurnRows]:
         design[rows_of_turn, np.searchsorted(columns, r.columns)] = r.way_design
         white[rows_of_turn] = r.way
     used = design[:, np.abs(design).max(axis=0) > 0]
-    rest = white - used @ np.linalg.lstsq(used, white, rcond=1e-9)[0]
-    if float(rest @ rest) <= MAX_WAY_CHI2 * max(size - used.shape[1], 1):
+    rest = white - used @ np.linalg.lstsq(used, white, rcond=tolerances.SINGULAR)[0]
+    if float(rest @ rest) <= thresholds.MAX_WAY_CHI2 * max(size - used.shape[1], 1):
         return rows
     none = np.zeros(0)
     return [replace(r, way=none, way_design=r.way_design[:0]) for r in rows]

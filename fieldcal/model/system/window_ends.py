@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import tolerances
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
@@ -22,9 +23,6 @@ from fieldcal.model.turns.attitude import closures, first_row_of_each
 from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.attitude_step import AttitudeStep
 from fieldcal.physics.experience import Experience
-
-FORCE_STEP = 1e-3
-"""Step of the force for a derivative, m/s^2."""
 
 
 @dataclass(frozen=True)
@@ -102,12 +100,12 @@ def output_slopes(state: State, x: Experience, since: Array) -> Array:
     """
     inputs, out = state.experienced(x), np.zeros((len(x), 3, 3))
     for c in range(3):
-        step = FORCE_STEP * np.eye(3)[c]
+        step = tolerances.DERIVATIVE_STEP * np.eye(3)[c]
         up, down = (
             state.output(replace(inputs, f=inputs.f + s * step), since)[:, :3]
             for s in (1.0, -1.0)
         )
-        out[:, :, c] = (up - down) / (2 * FORCE_STEP)
+        out[:, :, c] = (up - down) / (2 * tolerances.DERIVATIVE_STEP)
     return out
 
 

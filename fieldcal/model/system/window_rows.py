@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from fieldcal.core.samples import GYR, Array, Index, Mask
+from fieldcal.model import tolerances
 from fieldcal.model.causes.basis import RowView
 from fieldcal.model.causes.cause import Basis
 from fieldcal.model.causes.dictionary import Dictionary
@@ -16,10 +17,6 @@ from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.starting_angles import starting_angles
-
-MIN_VISIBLE_ACC = 1e-6
-"""Least change of an accelerometer by a column of typical size that windows show,
-m/s^2."""
 
 
 class WindowSystem(System):
@@ -106,7 +103,9 @@ class WindowSystem(System):
         if part.channel >= GYR.start:
             return super()._shows(part)
         size = (np.abs(part.design) / part.weight[:, None]).max(axis=0)
-        shows: Mask = size * self.dictionary.typical[part.columns] > MIN_VISIBLE_ACC
+        shows: Mask = (
+            size * self.dictionary.typical[part.columns] > tolerances.MIN_VISIBLE_ACC
+        )
         return shows
 
 

@@ -14,15 +14,9 @@ from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import cross
 from fieldcal.core.running_integral import running_integral
 from fieldcal.core.samples import Array, Index, Mask
+from fieldcal.model import resolutions, thresholds
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
-
-ACCELERATION_MEAN_S = 0.1
-"""Length of the means of the rate whose derivative is the angular acceleration, s."""
-
-MAX_MISCLOSURE_RAD = 0.3
-"""Largest closure that gyroscope errors can make, rad. A larger one means that outputs
-were clipped, or that the device was turned otherwise than its positions say."""
 
 
 def trapezoid_means(t: Array, values: Array, cut: Index) -> Array:
@@ -89,7 +83,7 @@ def antisymmetric_vector(matrix: Array) -> Array:
 def accelerations(t: Array, w: Array) -> Array:
     """Angular acceleration (m + 1, 3), rad/s^2, from short means of the rates w."""
     step = float(np.ptp(t)) / (len(t) - 1)
-    m = max(1, round(ACCELERATION_MEAN_S / step)) | 1
+    m = max(1, round(resolutions.ACCELERATION_MEAN_S / step)) | 1
     kernel = np.ones(m) / m
     padded = np.pad(w, ((m // 2, m // 2), (0, 0)), mode="edge")
     smooth = np.column_stack([np.convolve(c, kernel, "valid") for c in padded.T])
@@ -101,12 +95,12 @@ def accelerations(t: Array, w: Array) -> Array:
 def contradicts_force(x: Experience, pair: tuple[int, int], attitude: Array) -> bool:
     """Whether the attitude R at the end of a turn contradicts the forces f_p and f_q.
 
-    It does if the force at q, carried back to p, is more than `MAX_MISCLOSURE_RAD` from
-    the force at p.
+    It does if the force at q, carried back to p, is further from the
+    force at p than `thresholds.MAX_MISCLOSURE_RAD`.
     """
     p, q = (x.f[int(np.argmax(x.position == i))] for i in pair)
     cosine = float(p @ (attitude.T @ q)) / float(np.linalg.norm(p) * np.linalg.norm(q))
-    return bool(cosine < np.cos(MAX_MISCLOSURE_RAD))
+    return bool(cosine < np.cos(thresholds.MAX_MISCLOSURE_RAD))
 
 
 def turn_geometry(
@@ -158,7 +152,9 @@ def closures(f: Array, held: Array, end: Array) -> tuple[Array, Mask]:
 
     """
     rotation = end.T @ held[:, 1] @ np.swapaxes(held[:, 0], 1, 2)  # I + [phi]x
-    whole = (np.trace(rotation, axis1=1, axis2=2) - 1) / 2 > np.cos(MAX_MISCLOSURE_RAD)
+    whole = (np.trace(rotation, axis1=1, axis2=2) - 1) / 2 > np.cos(
+        thresholds.MAX_MISCLOSURE_RAD
+    )
     if whole.all():
         return antisymmetric_vector(rotation), whole
     up = f[:, 0] / np.linalg.norm(f[:, 0], axis=1, keepdims=True)

@@ -17,22 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import detections, resolutions
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.turns.attitude import interpolate_vectors
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
-
-INTEGRATION_STEP_S = 0.02
-"""Step of the integration, s; one sample where samples come less often."""
-
-WAY_MEAN_S = 0.15
-"""Length of the means of the accelerometers during a turn, s."""
-
-MAX_WAY_MEANS = 60
-"""Largest number of such means in one turn."""
-
-MIN_STEPS = 8
-"""Smallest number of steps of a turn that is integrated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,15 +96,19 @@ class IntegratedTurn:
 def divide_into_steps(leg: Leg) -> Steps | None:
     """Steps of about 0.02 s and pieces of about 0.15 s.
 
-    None if there are fewer than `MIN_STEPS` steps.
+    None if there are fewer than `detections.MIN_SAMPLES` steps.
     """
     block, first = leg.source.block, leg.first
     rate = leg.source.rate
-    each = max(1, round(INTEGRATION_STEP_S * rate))
+    each = max(1, round(resolutions.INTEGRATION_STEP_S * rate))
     count = (leg.last - first - 1) // each
-    if count < MIN_STEPS:
+    if count < detections.MIN_SAMPLES:
         return None
-    piece = max(1, round(WAY_MEAN_S * rate / each), -(-count // MAX_WAY_MEANS))
+    piece = max(
+        1,
+        round(resolutions.WAY_MEAN_S * rate / each),
+        -(-count // resolutions.MAX_WAY_MEANS),
+    )
     cut = np.append(np.arange(0, count - piece // 2, piece), count).astype(np.intp)
     t = block.t[first : first + count * each + 1]
     return Steps(first, t, each, np.arange(count + 1) * each, cut)

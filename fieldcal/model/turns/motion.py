@@ -6,28 +6,9 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import has_no_pause
+from fieldcal.model import detections, thresholds
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.row_source import RowSource
-
-MARGIN_S = 0.6
-"""Time before and after the motion that belongs to the integrated turn, s."""
-
-MAX_TURN_S = 60.0
-"""Longest turn that is integrated, s."""
-
-MIN_MOTION_RATIO = 2.0
-"""Least ratio of the largest rate to the limit of motion. Below it the motion cannot be
-located, and the whole gap between the windows is integrated."""
-
-BELONGING_S = 5.0
-"""Time before and after a motion in which smaller motions are looked for, s."""
-
-MIN_MOTION_RATE, MOTION_SIGMAS = 3e-3, 8.0
-"""Limit of motion in a tenth of a second: rad/s, and standard deviations of its mean
-by noise, whichever is more."""
-
-MOVING_SIGMAS = 5.0
-"""Standard deviations of the integrated angle from which the device moves."""
 
 
 def motion_bounds(
@@ -50,7 +31,11 @@ def motion_bounds(
         return None
     if not has_no_pause(block.t, first, last, rate):
         return None
-    whole = (first, last) if block.t[last - 1] - block.t[first] < MAX_TURN_S else None
+    whole = (
+        (first, last)
+        if block.t[last - 1] - block.t[first] < detections.MAX_TURN_S
+        else None
+    )
     rates = [rows.y[rows.x.position == p, 3:] for p in pair]
     if not all(np.isfinite(window_rates).any(axis=0).all() for window_rates in rates):
         return whole  # the rates at rest are not known
@@ -59,18 +44,24 @@ def motion_bounds(
     rest = [np.nanmean(window_rates, axis=0) / unit for window_rates in rates]
     total = np.vstack([np.zeros(3), np.cumsum(gyr - rest[1], axis=0)])
     mean_rate = np.abs(total[m:] - total[:-m]) / m
-    limit = np.maximum(MOTION_SIGMAS * noise / np.sqrt(m), MIN_MOTION_RATE)
+    limit = np.maximum(
+        detections.MOTION_SIGMAS * noise / np.sqrt(m), detections.MIN_MOTION_RATE
+    )
     at = np.flatnonzero((mean_rate > limit).any(axis=1))
-    if not (len(at) and (mean_rate / limit).max() > MIN_MOTION_RATIO):
+    if not (len(at) and (mean_rate / limit).max() > detections.MIN_MOTION_RATIO):
         return whole
-    nearby = round(BELONGING_S * rate)
+    nearby = round(detections.BELONGING_S * rate)
     before = gyr[max(at[0] - nearby, 0) : at[0]] - rest[0]
     after = gyr[at[-1] + m : at[-1] + m + nearby] - rest[1]
-    margin = round(MARGIN_S * rate)
+    margin = round(detections.MOTION_MARGIN_S * rate)
     start = first + int(at[0]) - _moving_at_end(before, noise) - margin
     end = first + int(at[-1]) + m + _moving_at_end(after[::-1], noise) + margin
     start, end = max(start, first), min(end, last)
-    return (start, end) if block.t[end - 1] - block.t[start] < MAX_TURN_S else None
+    return (
+        (start, end)
+        if block.t[end - 1] - block.t[start] < detections.MAX_TURN_S
+        else None
+    )
 
 
 def _moving_at_end(rates: Array, noise: Array) -> int:
@@ -81,5 +72,5 @@ def _moving_at_end(rates: Array, noise: Array) -> int:
     """
     angle = np.abs(np.cumsum(rates, axis=0))
     spread = noise * np.sqrt(np.arange(1, len(rates) + 1))[:, None]
-    moved = (angle > MOVING_SIGMAS * spread).any(axis=1)
+    moved = (angle > thresholds.DECIDES * spread).any(axis=1)
     return len(rates) - int(np.argmax(moved)) if moved.any() else 0

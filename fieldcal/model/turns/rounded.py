@@ -27,12 +27,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Block, Index, Mask
+from fieldcal.model import detections
 from fieldcal.model.rows.noise import quantisation_steps, rounding_sigma
 from fieldcal.windows.dead_band import dead_bands
-
-MAX_STEP_PART = 0.99
-"""Distance from the value in the windows, in steps, below which an output counts as
-that value: a mean between two values of the grid is less than one step from both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +92,7 @@ class StandingOutputs:
 
     def _at_window_value(self, gyr: Array) -> Mask:
         """Whether each output (n, 3) has the value of the windows, (n, 3)."""
-        return np.abs(gyr - self.value) < MAX_STEP_PART * self.step
+        return np.abs(gyr - self.value) < detections.MAX_STEP_PART * self.step
 
 
 def _run_factor(value: Array, length: Array) -> Array:

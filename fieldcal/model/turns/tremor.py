@@ -20,13 +20,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import detections
 from fieldcal.model.rows.row_source import RowSource
-
-WINDOW_EDGE_S = 10.0
-"""Part of a window next to the turn in which sway is measured, s."""
-
-MIN_SAMPLES = 16
-"""Number of samples below which no sway is measured."""
 
 
 def sway_at_ends(source: RowSource, windows: Index) -> float:
@@ -38,7 +33,7 @@ def sway_at_ends(source: RowSource, windows: Index) -> float:
     windows : (2, 2) first and end sample of the windows before and after the turn
 
     """
-    most = round(WINDOW_EDGE_S * source.rate)
+    most = round(detections.WINDOW_EDGE_S * source.rate)
     (first, end), (start, last) = windows.tolist()
     before = slice(max(first, end - most), end)
     after = slice(start, min(last, start + most))
@@ -60,7 +55,7 @@ def sway_variance(rate: Array, step: float) -> float:
 
     """
     n = len(rate)
-    if n < MIN_SAMPLES:
+    if n < detections.MIN_SWAY_SAMPLES:
         return 0.0
     angle = np.cumsum((rate - rate.mean(axis=0)) * step, axis=0)
     line = np.linalg.qr(np.column_stack([np.ones(n), np.arange(n)]))[0]

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Mask
+from fieldcal.model import detections, tolerances
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
@@ -38,12 +39,6 @@ from fieldcal.model.turns.tremor import sway_at_ends
 from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
-
-MIN_TURN_RAD = np.deg2rad(1.0)
-"""Smallest angle of a turn that is used, rad."""
-
-MAX_CORRECTIONS = 3
-"""Largest number of iterations of `other_gyro_errors`; each leaves 1 % of the error."""
 
 
 class TurnTracker:
@@ -111,7 +106,8 @@ class TurnTracker:
         """Integrate a turn, corrected for the state's other gyroscope errors.
 
         None if the motion is too short, if the attitude at its end contradicts the
-        window that it leads to, or if the device turned by less than `MIN_TURN_RAD`.
+        window that it leads to, or if the device turned by less than
+        `detections.MIN_TURN_RAD`.
         """
         ends, pair = leg.x, leg.pair
         if (steps := divide_into_steps(leg)) is None:
@@ -121,7 +117,7 @@ class TurnTracker:
         if contradicts_force(ends, pair, end):
             self.contradicted_turns.append(pair)
             return None
-        if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < MIN_TURN_RAD:
+        if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < detections.MIN_TURN_RAD:
             return None
         noise = self.rows.noise[3:] / np.abs(state.scale[3:])
         sampling_sigma = sampling_error(
@@ -157,7 +153,7 @@ class TurnTracker:
         correction: Array = np.zeros((len(steps.edge), 3))
         rows = first_row_of_each(leg.x, leg.pair)
         forces, held = leg.x.f[rows], leg.x.to_device_in(rows)
-        for _ in range(MAX_CORRECTIONS):
+        for _ in range(tolerances.MAX_CORRECTIONS):
             integrated = integrate_turn(leg, steps, correction)
             x = self._edges(leg, steps, integrated, forces, held)
             force_before_effects, x = x.f, apply_way_effects(x, state)

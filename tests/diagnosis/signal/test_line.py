@@ -11,10 +11,10 @@ from fieldcal.diagnosis.signal.line import (
     tune_line,
 )
 from fieldcal.diagnosis.signal.moments import moments_of
-from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import WindowSamples, samples_of_windows
 from fieldcal.effects.hum import Hum
 from fieldcal.effects.sway import Sway
+from fieldcal.model import resolutions
 from fieldcal.model.rows.reduce import reduce_to_rows
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
@@ -105,8 +105,8 @@ def test_sway_is_foretold_in_positions_not_seen() -> None:
 
 def test_a_line_is_tuned_in_windows_longer_than_a_periodogram() -> None:
     """What a periodogram tells of its frequency is far from what the window tells."""
-    pieces = recorded(3, 1, 12 * PERIODOGRAM_SAMPLES)
-    off = 0.3 * RATE / PERIODOGRAM_SAMPLES
+    pieces = recorded(3, 1, 12 * resolutions.PERIODOGRAM_SAMPLES)
+    off = 0.3 * RATE / resolutions.PERIODOGRAM_SAMPLES
     tone = tune_line(pieces, Hum(), moments_of(pieces, HZ + off))
     assert tone.channels == ("ay",)
     assert abs(tone.hz - HZ) < 4 * tone.sigmas["hz"]

@@ -11,7 +11,7 @@ from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.effects import catalogue
-from fieldcal.model import priors
+from fieldcal.model import priors, resolutions
 from fieldcal.model.causes import columns, effect_causes, smooth
 from fieldcal.model.causes.basis import Course, RowView
 from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
@@ -169,7 +169,7 @@ def test_where_columns_are() -> None:
     assert d.cosine_columns(2, 3).tolist() == [
         d.waves + 2 * d.span.count + i for i in range(3)
     ]
-    assert len(d.cosine_columns(1)) == smooth.MAX_COSINES
+    assert len(d.cosine_columns(1)) == resolutions.COSINES
     assert d.window_columns(4).tolist() == [d.windows + 4 * 9 + i for i in range(9)]
     assert d.position_count == 9 and d.window_positions.tolist() == list(range(9))
     assert d.scale - d.bias == 6 and d.windows - d.small_rotation == 18
@@ -212,14 +212,14 @@ def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
         if c < 3:
             own = fading[0].columns[4 * c : 4 * c + 4]
             np.testing.assert_array_equal(fading[1].columns, own)
-        for span, group in zip(smooth.HALF_WAVES, CAUSES[f"time:{channel}"].variants,
+        for span, group in zip(priors.HALF_WAVES, CAUSES[f"time:{channel}"].variants,
                                strict=True):  # fmt: skip
             np.testing.assert_allclose(
                 group.typical, both[c] * smooth.smooth_course_sizes(span)
             )
             assert group.shape == {"waves": span}
     for part, some in (("acc", range(3)), ("gyr", range(3, 6))):
-        for span, group in zip(smooth.HALF_WAVES, CAUSES[f"time:{part}"].variants,
+        for span, group in zip(priors.HALF_WAVES, CAUSES[f"time:{part}"].variants,
                                strict=True):  # fmt: skip
             shape = smooth.smooth_course_sizes(span)
             at = [WHOLE.waves + c * WHOLE.span.count + i for c in some
@@ -313,7 +313,7 @@ def test_positions_that_were_set_elsewhere() -> None:
 
 def test_biases_that_wander() -> None:
     effect = catalogue()["random_walk"]
-    shape = WHOLE.span.walk()[: smooth.MAX_COSINES]
+    shape = WHOLE.span.walk()[: resolutions.COSINES]
     for part, some in (("acc", (0, 1, 2)), ("gyr", (3, 4, 5))):
         cause = CAUSES[f"random_walk:{part}"]
         assert cause.chance == effect.chance(WHOLE.x) and cause.kind == "random"
@@ -456,7 +456,7 @@ def test_flicker_is_noise_of_as_many_cosines_as_biases_wander_by() -> None:
         assert (cause.kind, cause.reportable, cause.chance) == ("noise", False, 0.1)
         (group,) = cause.variants
         assert group.random and group.effect is None
-        k = np.arange(1, smooth.MAX_COSINES + 1)
+        k = np.arange(1, resolutions.COSINES + 1)
         size = {"acc": 2e-3, "gyr": 1e-4}[part]
         sizes = [size * UNIT[c] / np.sqrt(k) for c in some]
         np.testing.assert_allclose(group.typical, np.concatenate(sizes))
@@ -533,7 +533,7 @@ def test_a_cause_whose_size_is_known_has_it_in_all_its_variants() -> None:
 
 def test_walks_have_as_many_cosines_as_each_output_wanders_by() -> None:
     """Of each set of outputs: a cosine k of a walk is a k-th as large."""
-    modes = smooth.MAX_COSINES + np.array([0, 7, 3, 1, 9, 0])
+    modes = resolutions.COSINES + np.array([0, 7, 3, 1, 9, 0])
     d = made(ladder(), wander=replace(Wander.none(), modes=modes))
     params = catalogue()["random_walk"].params
     seen = set()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.flicker_series import MAX_TERMS, FlickerSeries
+from fieldcal.model import resolutions
+from fieldcal.model.causes.flicker_series import FlickerSeries
 
 DRAWS = 4000
 
@@ -110,7 +111,7 @@ def test_a_row_that_was_not_measured_changes_little() -> None:
 
 def test_between_rows_a_term_goes_on() -> None:
     series = FlickerSeries.of(*growing(200, 1.02))
-    assert series.terms.shape[1] == MAX_TERMS
+    assert series.terms.shape[1] == resolutions.MAX_COSINES
     np.testing.assert_allclose(series.at(series.t), series.terms)
     middle = series.at((series.t[:1] + series.t[1:2]) / 2)
     np.testing.assert_allclose(middle[0], series.terms[:2].mean(axis=0))

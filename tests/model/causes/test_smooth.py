@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small_sessions import G, ladder
 
+from fieldcal.model import priors, resolutions
 from fieldcal.model.causes import smooth
 from fieldcal.model.causes.smooth import CourseSpan
 from fieldcal.physics.experience_rows import select_rows
@@ -23,11 +24,13 @@ def test_waves_are_cosines_over_the_session() -> None:
     for row, part in zip(found, [0.0, 0.25, 0.5, 1.0, 1.0, 0.0], strict=False):
         np.testing.assert_allclose(row, np.cos(np.pi * k * part), atol=1e-12)
     assert (
-        CourseSpan(X.t).count == smooth.MAX_COSINES == CourseSpan(X.t).waves(X).shape[1]
+        CourseSpan(X.t).count
+        == resolutions.COSINES
+        == CourseSpan(X.t).waves(X).shape[1]
     )
     alone = CourseSpan(np.array([3.0]))
     still = replace(ladder(1), t=np.full(9, 3.0))
-    np.testing.assert_array_equal(alone.waves(still), np.ones((9, smooth.MAX_COSINES)))
+    np.testing.assert_array_equal(alone.waves(still), np.ones((9, resolutions.COSINES)))
 
 
 def test_a_row_has_the_mean_of_a_cosine_over_what_it_lasts() -> None:
@@ -46,7 +49,7 @@ def test_a_walk_has_the_variance_of_its_series() -> None:
     np.testing.assert_allclose(sizes[0] / sizes[:4], [1, 2, 3, 4])
 
 
-@pytest.mark.parametrize("span", smooth.HALF_WAVES)
+@pytest.mark.parametrize("span", priors.HALF_WAVES)
 def test_a_smooth_course_has_unit_variance_and_fades(span: float) -> None:
     sizes = smooth.smooth_course_sizes(span)
     assert (sizes**2).sum() / 2 == pytest.approx(1.0)
@@ -55,7 +58,7 @@ def test_a_smooth_course_has_unit_variance_and_fades(span: float) -> None:
         np.log(sizes / sizes[0]), -0.5 * (k**2 - 1) / span**2, atol=1e-9
     )
     beyond = np.exp(-0.5 * ((len(sizes) + 1) / span) ** 2)
-    assert beyond <= 1e-3 or len(sizes) == smooth.MAX_COSINES
+    assert beyond <= 1e-3 or len(sizes) == resolutions.COSINES
     assert np.exp(-0.5 * (len(sizes) / span) ** 2) > 1e-3
 
 
@@ -65,7 +68,7 @@ def test_a_force_that_changes_in_time() -> None:
     s = 2 * (X.t - X.t[0]) / np.ptp(X.t) - 1
     legendre = [s, (3 * s**2 - 1) / 2, (5 * s**3 - 3 * s) / 2,
                 (35 * s**4 - 30 * s**2 + 3) / 8]  # fmt: skip
-    assert found.shape == (len(X), 3 * smooth.TIME_POWERS)
+    assert found.shape == (len(X), 3 * resolutions.POLYNOMIALS)
     for axis in range(3):
         some = found[:, smooth.force_time_columns(axis)]
         for column, power in zip(some.T, legendre, strict=True):

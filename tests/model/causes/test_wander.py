@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from small_sessions import SD, ladder, rows_of
 
-from fieldcal.model import priors
-from fieldcal.model.causes import smooth
+from fieldcal.model import resolutions
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.averages import Rows
 from fieldcal.physics.experience_rows import select_rows
@@ -66,7 +65,7 @@ def test_a_walk_is_measured_beside_what_settles(size: float) -> None:
         rng = np.random.default_rng(seed)
         courses = np.column_stack([np.zeros(len(X)), walk(rng)])
         one = Wander.of(recorded(rng, size, courses), UNIT)
-        assert one.modes[1] > smooth.MAX_COSINES
+        assert one.modes[1] > resolutions.COSINES
         assert (one.walk_rate[[0, 2, 3, 4, 5]] < 0.1 * size).all()
         shares.append(one.share[1])
         found.append(one.walk_rate[1])
@@ -87,7 +86,7 @@ def test_flicker_is_measured_and_is_no_walk(size: float) -> None:
         found.append(one.flicker[1])
         modes = 2 * one.flicker[1] ** 2 * len(X) / (2 * SD[1] ** 2)
         assert one.modes[1] == int(
-            np.clip(modes, smooth.MAX_COSINES, priors.MAX_COSINES)
+            np.clip(modes, resolutions.COSINES, resolutions.MAX_COSINES)
         )
         assert one.share[1] > 0.5
         assert one.residual_variance(np.ones(1), 1)[0] > 0.05 * one.flicker[1] ** 2
@@ -120,9 +119,11 @@ def test_cosines_beyond_the_noise_are_as_many_as_it_is_above_it() -> None:
     information = len(X) / (2 * SD[1] ** 2)
     walks = found.walk_rate[1] * np.sqrt(2 * length * information) / np.pi
     modes = 2 * max(walks, found.flicker[1] ** 2 * information)
-    assert found.modes[1] == int(min(modes, priors.MAX_COSINES)) > smooth.MAX_COSINES
+    assert (
+        found.modes[1] == int(min(modes, resolutions.MAX_COSINES)) > resolutions.COSINES
+    )
     none = Wander.none()
-    assert not none.walk_rate.any() and set(none.modes) == {smooth.MAX_COSINES}
+    assert not none.walk_rate.any() and set(none.modes) == {resolutions.COSINES}
     assert not none.residual_covariance(np.arange(3.0), np.ones(3)).any()
 
 

@@ -8,7 +8,7 @@ from dense_model import Dense
 from gram_cases import TAU, WIDTH, case
 
 from fieldcal.core.samples import Array
-from fieldcal.model.evidence import levels as module
+from fieldcal.model import tolerances
 from fieldcal.model.evidence.levels import scan_instabilities
 
 SET = np.array([0, 3, 4, 7])
@@ -28,7 +28,9 @@ def left(dense: Dense, block: Array) -> tuple[Array, Array, Array]:
     return inner, some.T @ np.linalg.solve(total, dense.y), alone
 
 
-@pytest.mark.parametrize("at_once", [1, module.MAX_NUMBERS], ids=["single", "together"])
+@pytest.mark.parametrize(
+    "at_once", [1, tolerances.MAX_NUMBERS], ids=["single", "together"]
+)
 @pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
 @pytest.mark.parametrize("times", [ACC, GYRO, TURNS], ids=["acc", "gyro", "turns"])
 def test_levels_are_those_of_the_rows_written_out(
@@ -37,7 +39,7 @@ def test_levels_are_those_of_the_rows_written_out(
     at_once: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "MAX_NUMBERS", at_once)
+    monkeypatch.setattr(tolerances, "MAX_NUMBERS", at_once)
     taus = TAU * times
     found = scan_instabilities(case(2, free).gram, SET, WIDE, taus, FURTHER)
     for n, tau in enumerate(taus):

@@ -10,7 +10,7 @@ from gram_cases import TAU, case
 from small_sessions import Session, ladder
 
 from fieldcal.core.samples import Array
-from fieldcal.model import priors
+from fieldcal.model import priors, resolutions
 from fieldcal.model.evidence.eliminated import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.size_between import (
@@ -24,7 +24,6 @@ from fieldcal.model.evidence.sizing import (
 )
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.set_at_instability import (
-    INSTABILITY_STEPS_DOWN,
     LOWERED_TOGETHER,
     lowered_instability,
     with_typical_calibration,
@@ -209,7 +208,7 @@ def test_what_a_set_may_be_given_is_asked_beside_other_instabilities(seed: int) 
         *(
             lowered_instability(mode, some, down)
             for some in LOWERED_TOGETHER
-            for down in INSTABILITY_STEPS_DOWN
+            for down in resolutions.INSTABILITY_STEPS_DOWN
         ),
     }
     assert kept == expected

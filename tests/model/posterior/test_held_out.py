@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
-from fieldcal.model import priors
+from fieldcal.model import priors, resolutions, tolerances
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set, Sets
@@ -303,13 +303,13 @@ def test_of_few_windows_each_stretch_is_foretold_from_the_others() -> None:
     x = select_rows(ladder(55), range(110))
     few = SimpleNamespace(x=x, window_positions=np.array([0, 1]))
     found = folds(cast(Dictionary, few))
-    parts = held_out.STRETCHES_PER_WINDOW
+    parts = resolutions.STRETCHES_PER_WINDOW
     for p in range(2):
         own = found[x.position == p]
         assert np.count_nonzero(np.diff(own)) == parts - 1
         first = [0, *(np.flatnonzero(np.diff(own)) + 1)]
-        assert own[first].tolist() == [i % held_out.MAX_FOLDS for i in range(parts)]
+        assert own[first].tolist() == [i % tolerances.MAX_FOLDS for i in range(parts)]
         lengths = np.diff([*first, len(own)])
         assert lengths.max() - lengths.min() <= 1
     whole = folds(dictionary(ladder(3)))
-    np.testing.assert_array_equal(whole, ladder(3).position % held_out.MAX_FOLDS)
+    np.testing.assert_array_equal(whole, ladder(3).position % tolerances.MAX_FOLDS)

@@ -12,7 +12,6 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior import probabilities
-from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
 from fieldcal.model.search.selection import Search
 
@@ -78,7 +77,7 @@ def test_what_its_chance_brings_near_counts_though_its_evidence_is_behind(
         search = session.search(off)
         best = max((search.sets.evaluate(((free, v),)) for v in free.variants),
                    key=lambda s: s.score)  # fmt: skip
-        monkeypatch.setattr(probabilities, "ALTERNATIVE_MARGIN", patience)
+        monkeypatch.setattr(thresholds, "ALTERNATIVE_LOG_DISTANCE", patience)
         walks = {s.keys: w for s, w in Posterior(search, best).weights}
         assert (frozenset({"random_walk:acc"}) in walks) == counts
         assert not counts or walks[frozenset({"random_walk:acc"})] > 0.5
@@ -183,7 +182,7 @@ def test_sets_near_the_best_are_varied_and_no_others(
         probabilities, "visit_variations", lambda _, *there: varied.append(there)
     )
     far = [s for s in search.sets.visited.values()
-           if s.score <= best.score - MAX_LOG_DISTANCE]  # fmt: skip
+           if s.score <= best.score - thresholds.AVERAGED_LOG_DISTANCE]  # fmt: skip
     assert far and best.members
     Posterior(search, best)
     sets = [one for one, _ in varied]

@@ -10,11 +10,10 @@ import pytest
 from small_sessions import Session, ladder
 
 from fieldcal.core.samples import Array
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.unfitted_groups import eliminate_with, groups_not_in
-from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.posterior.model_average import (
     ModelAverage,
     average_of_columns,
@@ -197,11 +196,11 @@ def test_only_sets_count_that_are_likely_beside_the_best() -> None:
     average, _ = average_of(search)
     top = max(w for _, w in average.posterior.weights_on_grid)
     weights = [w for _, w in average.sets]
-    assert min(weights) > np.exp(-MAX_LOG_DISTANCE) * top
+    assert min(weights) > np.exp(-thresholds.AVERAGED_LOG_DISTANCE) * top
     kept = [
         w
         for _, w in average.posterior.weights_on_grid
-        if w > np.exp(-MAX_LOG_DISTANCE) * top
+        if w > np.exp(-thresholds.AVERAGED_LOG_DISTANCE) * top
     ]
     assert sorted(weights) == sorted(kept)
 

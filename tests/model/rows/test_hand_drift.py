@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.hand_drift import (
-    STEADY_HAND_K,
-    WALKING_HAND_K,
-    ForceTurn,
-    drift_factor,
-    force_turn_rate,
-)
+from fieldcal.model import priors
+from fieldcal.model.rows.hand_drift import ForceTurn, drift_factor, force_turn_rate
 
 RATE, SECONDS, G = 100.0, 6.0, 9.81
 T = np.arange(0.0, SECONDS, 1 / RATE)
@@ -78,8 +73,9 @@ def test_one_that_trembles_is_told_from_one_that_walks() -> None:
 
 def test_if_nothing_tells_it_is_taken_to_walk() -> None:
     blind = [ForceTurn(0.0, np.inf)] * 3
-    assert drift_factor(blind, np.full(3, 1e-8)) == pytest.approx(WALKING_HAND_K)
-    assert drift_factor(blind, np.zeros(3)) == WALKING_HAND_K
+    assert drift_factor(blind, np.full(3, 1e-8)) == pytest.approx(priors.WALKING_HAND_K)
+    assert drift_factor(blind, np.zeros(3)) == priors.WALKING_HAND_K
     assert (
-        drift_factor([ForceTurn(1e-9, 1e-9)] * 500, np.full(500, 1e-6)) == STEADY_HAND_K
+        drift_factor([ForceTurn(1e-9, 1e-9)] * 500, np.full(500, 1e-6))
+        == priors.STEADY_HAND_K
     )

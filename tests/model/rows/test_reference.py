@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.model import detections
 from fieldcal.model.rows.low_pass import first_order, second_order
 from fieldcal.model.rows.reference import Reference
-from fieldcal.model.rows.response import (
-    MIN_SECOND_ORDER_S,
-    MIN_TIME_CONSTANT_S,
-    Response,
-)
+from fieldcal.model.rows.response import Response
 
 W = np.array([0.7, 1.9, 4.1, 6.3, 9.0, 11.0])
 T: Array = np.arange(0.0, 12.0, 0.01)
@@ -67,8 +64,8 @@ def test_the_slope_is_what_an_output_loses_with_its_time_constant(tau: float) ->
 def test_without_a_time_constant_the_slope_is_that_to_the_least() -> None:
     found = Response.of(REFERENCE).slope.at(INSIDE)
     expected = (
-        waves(INSIDE) - followed(MIN_TIME_CONSTANT_S).at(INSIDE)
-    ) / MIN_TIME_CONSTANT_S
+        waves(INSIDE) - followed(detections.MIN_TIME_CONSTANT_S).at(INSIDE)
+    ) / detections.MIN_TIME_CONSTANT_S
     np.testing.assert_allclose(found, expected, atol=0.02)
 
 
@@ -96,17 +93,23 @@ def test_a_step_from_nothing_leads_to_the_low_pass_that_shows_as_much() -> None:
     """Beyond a delay it shows by the cube of tau, or by the square of first order."""
     plain = Response.of(REFERENCE)
     there = plain.step_towards(
-        REFERENCE, 0.0, 0.0, 0.03**3 / (3 * MIN_SECOND_ORDER_S**2)
+        REFERENCE, 0.0, 0.0, 0.03**3 / (3 * detections.MIN_SECOND_ORDER_S**2)
     )
     assert there.second == pytest.approx(0.03)
     early = there.late + np.sqrt(2) * there.second
-    assert early == pytest.approx(np.sqrt(2) * 0.03**3 / (3 * MIN_SECOND_ORDER_S**2))
-    first = plain.step_towards(REFERENCE, 0.0, 0.03**2 / MIN_TIME_CONSTANT_S, 0.0)
+    assert early == pytest.approx(
+        np.sqrt(2) * 0.03**3 / (3 * detections.MIN_SECOND_ORDER_S**2)
+    )
+    first = plain.step_towards(
+        REFERENCE, 0.0, 0.03**2 / detections.MIN_TIME_CONSTANT_S, 0.0
+    )
     assert first.tau == pytest.approx(0.03)
     assert plain.step_towards(REFERENCE, 0.01, 0.0, 0.0).sensed is REFERENCE
     exact = plain.step_towards(REFERENCE, 0.01, 0.02, 0.03, free=False)
     assert (exact.late, exact.tau, exact.second) == (0.01, 0.02, 0.03)
-    assert there.distance_to(first) == pytest.approx(0.03 / MIN_TIME_CONSTANT_S)
+    assert there.distance_to(first) == pytest.approx(
+        0.03 / detections.MIN_TIME_CONSTANT_S
+    )
 
 
 def test_a_wave_passes_low_passes_of_both_orders_in_turn() -> None:

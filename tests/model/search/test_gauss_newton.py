@@ -18,7 +18,7 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.evidence.sizing import Sizes
-from fieldcal.model.search.gauss_newton import MAX_ROTATION, MAX_STEP, GaussNewton
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.inference import Inference, InferenceResult, resume
 from fieldcal.model.search.offers import Offers, OfferTable
 from fieldcal.model.search.pairs import offered_pairs
@@ -511,7 +511,7 @@ def test_a_step_beyond_what_is_linear_ends_on_the_way() -> None:
     # from a turn of 4 rad it is a quarter of the way, in all columns alike
     far = zeros.copy()
     first = d.rotations.start
-    far[first] = whole[first] + 4 * MAX_ROTATION
+    far[first] = whole[first] + 4 * priors.SMALL_ROTATION
     state, values = fit._step_towards(settled, far)
     np.testing.assert_allclose(values, far + (whole - far) / 4, rtol=1e-12, atol=1e-15)
     assert state.small_rotation.flat[0] == pytest.approx(values[first])
@@ -521,6 +521,6 @@ def test_a_step_beyond_what_is_linear_ends_on_the_way() -> None:
     # and so for a parameter, by its typical size
     own = next(c for c in d.causes if c.name == "angle_offset").variants[0].columns[0]
     far = zeros.copy()
-    far[own] = 2 * MAX_STEP * d.typical[own]
+    far[own] = 2 * priors.FREE_SIZE * d.typical[own]
     _, values = fit._step_towards(settled, far)
     np.testing.assert_allclose(values, far + (whole - far) / 2, rtol=1e-12, atol=1e-15)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from small_sessions import Session, ladder
 
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
-from fieldcal.model.search.selection import PREDICTION_SLACK, Search
+from fieldcal.model.search.selection import Search
 from fieldcal.model.search.variations import visit_variations
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "cross_coupling", "settling:acc",
@@ -245,7 +245,7 @@ def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -
     (offer,) = [o for o in offered if o.member[0] is ACC]
     assert offer.member[1].shape == acc[1].shape
     taken = search.offers.accept(search.sets.evaluate((gyr,)), offer)
-    assert abs(taken.score - offer.score) < 2 * PREDICTION_SLACK
+    assert abs(taken.score - offer.score) < 2 * thresholds.PREDICTION_SLACK
 
 
 def test_what_is_known_from_elsewhere_stays_so_large_beside_every_offer() -> None:

@@ -14,9 +14,9 @@ from fieldcal.cli import main
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.fit import build_fit
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
+from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes
-from fieldcal.model.search.inference import MAX_KEPT_STEP
 from fieldcal.session.folder import Session
 
 EVERY = {"cross_coupling", "gyro_cross_coupling", "gyro_scale"}
@@ -60,7 +60,7 @@ def test_the_state_stays_where_the_set_does() -> None:
     own, best = inferred.fit, inferred.best
     own.gram(inferred.state, inferred.values, None)
     _, moved, _ = own.settle(inferred.state, inferred.values, best.members, best.sizes)
-    assert own.largest_step(best, inferred.values, moved) < MAX_KEPT_STEP
+    assert own.largest_step(best, inferred.values, moved) < thresholds.VISIBLE
 
 
 def test_how_a_position_lies_moves_no_closure() -> None:

@@ -9,8 +9,9 @@ import pytest
 from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
 from fieldcal.model.search.gauss_newton import GaussNewton
-from fieldcal.model.system.starting_angles import CONVERGES_WITHIN, starting_angles
+from fieldcal.model.system.starting_angles import starting_angles
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.experience import Experience
 
@@ -35,7 +36,9 @@ def turn_deg(y: Array, position: int) -> Array:
 @pytest.mark.parametrize("position", range(len(LADDER)))
 def test_near_the_stated_angle_the_stated_angle_is_the_start(position: int) -> None:
     alpha, beta = LADDER[position]
-    far = np.rad2deg(CONVERGES_WITHIN) - 2.5  # the bias is worth up to 2.4 degrees
+    far = (
+        np.rad2deg(thresholds.CONVERGES_WITHIN_RAD) - 2.5
+    )  # the bias is worth up to 2.4 degrees
     assert not turn_deg(held_at(position, alpha + far, beta), position).any()
 
 
@@ -57,7 +60,7 @@ def test_else_it_is_near_the_force_that_shows(alpha: float, beta: float) -> None
         Experience.at_rest(a[:1], a[1:], 1.0).f[0]
         for a in (np.deg2rad(LADDER[2]) + turn, np.deg2rad([alpha, beta]))
     )
-    assert np.linalg.norm(start - held) < CONVERGES_WITHIN
+    assert np.linalg.norm(start - held) < thresholds.CONVERGES_WITHIN_RAD
 
 
 def test_of_alike_orientations_the_smaller_turn_is_likelier() -> None:

@@ -10,11 +10,10 @@ import pytest
 from fieldcal.core.frames import direction_cosines
 from fieldcal.core.rotation import cross_matrix, rotation_matrices
 from fieldcal.core.samples import Array, Block
+from fieldcal.model import resolutions, thresholds
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.model.turns import integration
 from fieldcal.model.turns.attitude import (
-    MAX_MISCLOSURE_RAD,
     accelerations,
     antisymmetric_vector,
     contradicts_force,
@@ -77,7 +76,7 @@ def test_an_attitude_that_is_far_off_is_lost(off: float, lost: bool) -> None:
     x, f = ends(), ends().f[0] / np.linalg.norm(ends().f[0])
     across = np.cross(f, [0.3, -0.8, 0.5])
     across /= np.linalg.norm(across)
-    assert MAX_MISCLOSURE_RAD == 0.3
+    assert thresholds.MAX_MISCLOSURE_RAD == 0.3
     assert contradicts_force(x, (0, 1), way() @ rotation_matrices(off * across)) == lost
     about = way() @ rotation_matrices(off * f)
     assert not contradicts_force(x, (0, 1), about)
@@ -224,7 +223,7 @@ def test_a_turn_of_few_steps_is_none_and_a_long_one_has_no_more_pieces() -> None
     found = divide_into_steps(leg(100.0, 0.19, np.ones(3)))
     assert found is not None and len(found.edge) == 10
     long = divide_into_steps(leg(100.0, 50.0, np.ones(3)))
-    assert long is not None and integration.MAX_WAY_MEANS - 1 <= len(long.cut) - 1 <= 60
+    assert long is not None and resolutions.MAX_WAY_MEANS - 1 <= len(long.cut) - 1 <= 60
 
 
 def test_integrated_rates_are_rid_of_what_is_known() -> None:

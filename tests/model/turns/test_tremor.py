@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.model import detections
 from fieldcal.model.rows.row_source import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.model.turns.tremor import MIN_SAMPLES, sway_at_ends, sway_variance
+from fieldcal.model.turns.tremor import sway_at_ends, sway_variance
 from fieldcal.session.description_file import parse_description
 
 STEP, SECONDS = 0.01, 10.0
@@ -39,7 +40,10 @@ def test_noise_is_no_swaying() -> None:
 
 
 def test_of_a_few_samples_nothing_is_known() -> None:
-    assert sway_variance(rates(2e-3, 1.6, 0.0, 1)[: MIN_SAMPLES - 1], STEP) == 0.0
+    assert (
+        sway_variance(rates(2e-3, 1.6, 0.0, 1)[: detections.MIN_SWAY_SAMPLES - 1], STEP)
+        == 0.0
+    )
 
 
 def test_ends_of_a_turn_sway_by_ten_seconds_on_either_side_of_it() -> None:

@@ -36,9 +36,9 @@ whose noise is not quite white."""
 MAX_REST_RATE, MAX_REST_FORCE = 2e-3, 0.05
 """Differences that are never motion, however low the noise, rad/s and m/s^2."""
 
-MIN_MOTION_RATE, MOTION_SIGMAS = 3e-3, 8.0
-"""Limit of motion in a tenth of a second: rad/s, and standard deviations of its mean by
-noise, whichever is more."""
+TURN_MEAN_S, MIN_MOTION_RATE, MOTION_SIGMAS = 0.1, 3e-3, 8.0
+"""Length of a mean of the rate, s, and its limit of motion: rad/s, and standard
+deviations by noise, whichever is more."""
 
 MIN_MOTION_RATIO = 2.0
 """Ratio of the largest rate to the limit of motion. Below it the motion cannot be
@@ -146,6 +146,10 @@ motion at w, 7e-4 of one at 1 Hz."""
 
 # -- the temperature changes
 
+MIN_WARMING_K, WARMING_SIGMAS = 0.1, 6.0
+"""Change that a thermometer must show to have shown one, K, and standard deviations of
+its own noise, whichever is more."""
+
 MAX_VALUE_MISFIT = 1.3
 """Times the noise of the means that a line may leave of them; more is flat."""
 
@@ -160,14 +164,15 @@ MAX_RATE_DIFFERENCE = 1.5
 NOISIER_SIGMAS = 6.0
 """Standard deviations from which a window counts as noisier than the others."""
 
-LINE_POWER_RATIO, LOWEST_LINE_HZ = 30.0, 2.0
+LINE_POWER_RATIO, LOWEST_VIBRATION_HZ = 30.0, 2.0
 """Power of a line in a noisy window, in those of its neighbours at the median. What
 is slower may be the sensors' own."""
 
 # -- a line is in all windows
 
-MIN_CYCLES = 2.5
-"""Fewest cycles in a window that make a line."""
+MIN_CYCLES, LOWEST_LINE_HZ = 2.5, 0.05
+"""Fewest cycles in a window that make a line, and the lowest frequency of one, Hz: what
+is slower is a course in time."""
 
 SLOPE_PERIODS = 30.0
 """Periods in a window up to which a slope takes a part of a line: 0.07 % here."""

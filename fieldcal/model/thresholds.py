@@ -89,8 +89,9 @@ in the place of another makes that ambiguous."""
 WRONG_MODEL = 9.0
 """chi2 per degree of freedom from which the model, not the noise, is at fault."""
 
-MIN_TURN_DOF = 5
-"""Degrees of freedom of the turns from which their residual says something."""
+FEW_DOF = 5
+"""Degrees of freedom below which a residual says little of itself: its size is then
+uncertain by a third."""
 
 USEFUL = {
     "acc_bias": 1.0, "acc_scale": 0.1, "cross_coupling": 0.1,
@@ -129,6 +130,10 @@ MEANINGLESS_ANGLE_DEG = 45.0
 parts one axis from the next. Nobody sets them so; session.toml is wrong."""
 
 # -- how it is said
+
+CLEARLY_FURTHER = 1.2
+"""Times the standard deviations of another position from which one decides better
+between two causes: the ladder's own order counts as long as less is gained."""
 
 LARGEST_LOG_ODDS = 40.0
 """Largest log odds that are stated: no model is as sure as 2e17 to 1."""

@@ -232,7 +232,7 @@ def _scatter_warnings(estimate: ParameterEstimate) -> list[str]:
                 words.scatter_warning(name, agreed.chi2, agreed.dof, spread, unit)
             )
     chi2, dof = closure_chi2(estimate)
-    if dof >= thresholds.MIN_TURN_DOF:
+    if dof >= thresholds.FEW_DOF:
         spread = closure_scatter(estimate.mixture)
         sentences.append(words.scatter_warning("turns", chi2, dof, spread, "rad"))
     return sentences

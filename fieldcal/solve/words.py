@@ -51,7 +51,11 @@ def scatter_warning(what: str, chi2: float, dof: int, spread: float, unit: str) 
     """Warning of scatter beyond the noise; empty if there is none."""
     if chi2 <= dof or chi2_chance(chi2, dof) >= thresholds.BEYOND_NOISE:
         return ""
-    few = " (itself uncertain, with so few degrees of freedom)" if dof < 5 else ""
+    few = (
+        " (itself uncertain, with so few degrees of freedom)"
+        if dof < thresholds.FEW_DOF
+        else ""
+    )
     cause = "run fieldcal diagnose to see where it comes from"
     if what == "positions":
         angle = np.rad2deg(spread / G0)

@@ -109,7 +109,8 @@ def _of_turns(
         off = turn.design[:, at] @ values[turn.columns[at]]
         way = turn.way_design[:, at] @ values[turn.columns[at]]
         squares[i] = float(turn.info @ off**2) + float(way @ way)
-    out = squares > max(thresholds.STANDS_OUT**2, 0.05 * squares.max())
+    trace = thresholds.IN_CHANNEL_PART * squares.max()
+    out = squares > max(thresholds.STANDS_OUT**2, trace)
     contributing = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
     places = tuple(sorted({p for t in contributing for p in t.positions}))
     source = explanation.source
@@ -147,7 +148,8 @@ def largest_turn_outputs(
     for triad in (CHANNELS[:3], CHANNELS[3:]):
         largest = max((out.get(n, 0.0) for n in triad), default=0.0)
         for name in triad:
-            if out.get(name, 0.0) <= 0.1 * largest or largest <= 0.0:
+            trace = thresholds.IN_CHANNEL_PART * largest**2
+            if out.get(name, 0.0) ** 2 <= trace or largest <= 0.0:
                 out.pop(name, None)
     return out
 

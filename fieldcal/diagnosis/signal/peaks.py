@@ -51,7 +51,7 @@ def highest_peak(
     """
     shortest = pieces.shortest_samples(resolutions.PERIODOGRAM_SAMPLES) / pieces.rate
     low, reach = (
-        max(0.05, detections.MIN_CYCLES / shortest),
+        max(detections.LOWEST_LINE_HZ, detections.MIN_CYCLES / shortest),
         detections.LINE_DISTANCE_CYCLES / shortest,
     )
     one_phase = [s for s in spectra if s.count == 1]

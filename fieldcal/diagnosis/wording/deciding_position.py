@@ -85,7 +85,7 @@ def deciding_position(
         place = rows_at_session_end(x, *np.deg2rad([[alpha], [beta]]))
         outputs = [s.output(s.experienced(place), since) for s in states]
         apart = float(np.nanmax(np.abs(outputs[0] - outputs[1]) / sd))
-        if best is None or apart > best.apart * 1.2:
+        if best is None or apart > best.apart * thresholds.CLEARLY_FURTHER:
             at = [i for i, angles in enumerate(held) if angles == (alpha, beta)]
             number = about.indices_in_file(at[:1])[0] + 1 if at else 0
             best = DecidingPosition(alpha, beta, apart, number)

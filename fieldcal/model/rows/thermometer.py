@@ -42,7 +42,7 @@ class Thermometer:
     def of(cls, block: Block) -> Thermometer:
         """Smooth the temperature of a recording."""
         known = np.isfinite(block.temperature)
-        if known.sum() < 8:
+        if known.sum() < detections.MIN_SAMPLES:
             t = np.array([0.0])
             return cls(t, np.array([np.nan]), np.array([np.nan]), np.nan, np.nan)
         t, mean, count = _means(block.t[known], block.temperature[known])
@@ -58,7 +58,8 @@ class Thermometer:
         """Whether the temperature changed by more than the thermometer's own noise."""
         if not np.isfinite(self.start_c):
             return False
-        return bool(np.ptp(self.warming) > max(0.1, 6 * self.noise))
+        least = max(detections.MIN_WARMING_K, detections.WARMING_SIGMAS * self.noise)
+        return bool(np.ptp(self.warming) > least)
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Warming and heating at some instants, (n,) each."""

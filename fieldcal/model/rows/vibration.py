@@ -144,7 +144,10 @@ def without_lines(piece: Array, rate_hz: float) -> Array:
     known: Mask = np.all(np.isfinite(piece), axis=1)
     t = np.arange(len(piece)) / rate_hz
     out = piece.copy()
-    if known.sum() < 64 or len(piece) > tolerances.SAMPLES_AT_ONCE:
+    if (
+        known.sum() < detections.MIN_LINE_SAMPLES
+        or len(piece) > tolerances.SAMPLES_AT_ONCE
+    ):
         return out
     for _ in range(tolerances.MAX_LINES_OF_WINDOW):
         hz = _strongest_line_hz(out[known], rate_hz)
@@ -160,14 +163,14 @@ def _strongest_line_hz(y: Array, rate_hz: float) -> float | None:
     taper = np.hanning(len(y))[:, None]
     power = np.abs(np.fft.rfft((y - y.mean(axis=0)) * taper, n, axis=0)) ** 2
     hz = np.fft.rfftfreq(n, 1 / rate_hz)
-    power = power[hz >= detections.LOWEST_LINE_HZ]
+    power = power[hz >= detections.LOWEST_VIBRATION_HZ]
     if not len(power):
         return None
     level = np.maximum(np.median(power, axis=0), 1e-300)
     total = (power / level).max(axis=1)
     at = int(np.argmax(total))
     return (
-        float(hz[hz >= detections.LOWEST_LINE_HZ][at])
+        float(hz[hz >= detections.LOWEST_VIBRATION_HZ][at])
         if total[at] > detections.LINE_POWER_RATIO
         else None
     )

@@ -26,7 +26,7 @@ def motion_bounds(
 
     """
     block, rate = source.block, source.rate
-    gap, m = slice(first, last), max(2, round(0.1 * rate))
+    gap, m = slice(first, last), max(2, round(detections.TURN_MEAN_S * rate))
     if last - first < 4 * m or not source.usable[gap].all():
         return None
     if not has_no_pause(block.t, first, last, rate):

@@ -169,9 +169,7 @@ def difference_rows(
 
 
 def _clearest(one: Difference) -> float:
-    return max(
-        (_significance(p.difference) for p in one.parameters.values()), default=0.0
-    )
+    return max((p.difference.sigmas for p in one.parameters.values()), default=0.0)
 
 
 def difference_row(one: Difference) -> tuple[str, str, str, str]:
@@ -185,9 +183,9 @@ def difference_row(one: Difference) -> tuple[str, str, str, str]:
     what = one.id.replace("_", " ") + _or_else(one)
     if not told:
         return what, who, "", ""
-    name = max(told, key=lambda n: _significance(told[n].difference))
+    name = max(told, key=lambda n: told[n].difference.sigmas)
     pair = told[name]
-    more = sum(_significance(p.difference) > STANDS_OUT for p in told.values()) - 1
+    more = sum(p.difference.sigmas > STANDS_OUT for p in told.values()) - 1
     also = f" (+{more})" if more > 0 else ""
     both = (
         "real "
@@ -205,9 +203,3 @@ def difference_row(one: Difference) -> tuple[str, str, str, str]:
 
 def _quantity_or_none(quantity: Quantity | None) -> str:
     return "none" if quantity is None else pretty_quantity(quantity)
-
-
-def _significance(quantity: Quantity) -> float:
-    if isinstance(quantity.value, str) or not quantity.sigma:
-        return 0.0
-    return abs(quantity.value) / quantity.sigma

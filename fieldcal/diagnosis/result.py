@@ -34,6 +34,13 @@ class Quantity(Part):
     sigma: float | None
     unit: str
 
+    @property
+    def sigmas(self) -> float:
+        """Size of the value in standard deviations; 0 of a text."""
+        if isinstance(self.value, str) or not self.sigma:
+            return 0.0
+        return abs(self.value) / self.sigma
+
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
         if isinstance(self.value, str):

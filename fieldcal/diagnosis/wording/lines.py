@@ -39,7 +39,7 @@ def _impact(finding: FoundEffect) -> tuple[int, float]:
         return 0, 0.0
     if isinstance(effect, Scatter):
         return 1, 0.0
-    return 2, max(map(_significance, finding.moves.values()), default=0.0)
+    return 2, max((q.sigmas for q in finding.moves.values()), default=0.0)
 
 
 def effect_lines(effects: Sequence[FoundEffect]) -> tuple[EffectLine, ...]:
@@ -52,7 +52,7 @@ def effect_lines(effects: Sequence[FoundEffect]) -> tuple[EffectLine, ...]:
 
 def _line(name: str, effects: Sequence[FoundEffect]) -> EffectLine:
     largest = max(
-        effects, key=lambda f: max(map(_significance, f.parameters.values()), default=0)
+        effects, key=lambda f: max((q.sigmas for q in f.parameters.values()), default=0)
     )
     often = f" ({len(effects)} times)" if len(effects) > 1 else ""
     what = name.replace("_", " ") + often
@@ -80,11 +80,9 @@ def clearest_parameter(parameters: Mapping[str, Quantity]) -> str:
     if not parameters:
         return "not known"
     names = [n for n, q in parameters.items() if q.unit != "s"] or list(parameters)
-    name = max(names, key=lambda n: _significance(parameters[n]))
+    name = max(names, key=lambda n: parameters[n].sigmas)
     clear = sum(
-        _significance(q) > thresholds.STANDS_OUT
-        for n, q in parameters.items()
-        if n != name
+        q.sigmas > thresholds.STANDS_OUT for n, q in parameters.items() if n != name
     )
     more = f" (+{clear})" if clear else ""
     called = "" if name in UNITS else name.removesuffix("_deg").removesuffix("_s")
@@ -98,13 +96,6 @@ def pretty_quantity(quantity: Quantity) -> str:
     return text.removesuffix(unit) + format_unit(unit) if unit != "1" else text
 
 
-def _significance(quantity: Quantity) -> float:
-    """Size of a value in standard deviations; 0 of a text."""
-    if isinstance(quantity.value, str) or not quantity.sigma:
-        return 0.0
-    return abs(quantity.value) / quantity.sigma
-
-
 def _calibration_change(finding: FoundEffect) -> str:
     """What it does to the calibration, in a few words."""
     effect = catalogue()[finding.id]
@@ -116,9 +107,9 @@ def _calibration_change(finding: FoundEffect) -> str:
         return "nothing: subtracted"
     if not finding.moves:
         return "nothing that shows"
-    name = max(finding.moves, key=lambda n: _significance(finding.moves[n]))
+    name = max(finding.moves, key=lambda n: finding.moves[n].sigmas)
     most = finding.moves[name]
-    sigmas = _significance(most)
+    sigmas = most.sigmas
     if sigmas < thresholds.MOVED:
         return f"less than {thresholds.MOVED:g} σ"
     unit = format_unit(most.unit)

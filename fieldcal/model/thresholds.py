@@ -39,8 +39,13 @@ IN_CHANNEL = DECIDES**2
 """Squares that a channel has to lose for the mismatch to be in it."""
 
 IN_CHANNEL_PART = 0.03
-"""The same as part of the most that any channel loses: less is a trace of what is
-elsewhere."""
+"""The same as part of the most that any channel, or turn, loses: less is a trace of
+what is elsewhere."""
+
+IN_OUTPUT_PART = 0.1
+"""Amplitude of an output in turns, of the largest of its triad, from which a filter or a
+delay is said to be in it. With 0.17, which is the part of squares above, a filter of
+all gyroscopes was said to be in one of them."""
 
 SEES_EARTH = 20.0
 """Earth rate over the noise of one window from which tactical gyroscopes see it."""

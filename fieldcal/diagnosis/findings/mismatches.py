@@ -148,8 +148,8 @@ def largest_turn_outputs(
     for triad in (CHANNELS[:3], CHANNELS[3:]):
         largest = max((out.get(n, 0.0) for n in triad), default=0.0)
         for name in triad:
-            trace = thresholds.IN_CHANNEL_PART * largest**2
-            if out.get(name, 0.0) ** 2 <= trace or largest <= 0.0:
+            trace = thresholds.IN_OUTPUT_PART * largest
+            if out.get(name, 0.0) <= trace or largest <= 0.0:
                 out.pop(name, None)
     return out
 

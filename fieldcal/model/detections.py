@@ -11,14 +11,8 @@ import math
 # -- enough samples
 
 MIN_SAMPLES = 8
-"""Samples of a channel, steps of a turn, or differences from which anything is told:
-their noise is known to a quarter."""
-
-MIN_DRIFT_SAMPLES = 10
-"""Samples that tell a slope and its noise."""
-
-MIN_SWAY_SAMPLES = 16
-"""Samples of which an angle about a straight line is told from noise."""
+"""Samples of a channel or of a slope, steps of a turn, or differences from which
+anything is told: their noise is known to a quarter."""
 
 MIN_WINDOW_SAMPLES = 20
 """Samples of a window that is used; a shorter one is told to the user."""
@@ -74,9 +68,9 @@ PUSHED_NOISE_RATIO = 1.5
 """Times their quickest noise that accelerometers show where a hand pushes the device:
 on a table that trembles 1.3 at most in published recordings."""
 
-WANDER_SIGMAS, ACROSS_RATIO = 6.0, 1.5
-"""Standard deviations of what the squares across the force have too many, and by how
-much more they have than those along it, where the angle wanders."""
+ACROSS_RATIO = 1.5
+"""Times the squares along the force that those across it have where the angle wanders,
+besides being too many."""
 
 # -- the base sways
 

@@ -19,7 +19,11 @@ DIFFERS = 0.9
 a name there, as what a recording leaves unexplained does, and a gate must rarely be
 wrong."""
 
-ALIAS_LOG_MARGIN = 4.6
+LOOKED_AT = 0.01
+"""Probability below which an explanation, that a window is bad, or a counter that began
+anew and looks as if it had gone on, is not looked at: it moves no interval."""
+
+ALIAS_LOG_MARGIN = -math.log(LOOKED_AT)
 """Evidence, ln, by which an explanation may be behind and still stand for another: 100
 to 1, which no one would question."""
 
@@ -43,8 +47,8 @@ IN_CHANNEL_PART = 0.03
 what is elsewhere."""
 
 IN_OUTPUT_PART = 0.1
-"""Amplitude of an output in turns, of the largest of its triad, from which a filter or a
-delay is said to be in it. With 0.17, which is the part of squares above, a filter of
+"""Amplitude of an output in turns, of the largest of its triad, from which a filter or
+a delay is said to be in it. With 0.17, which is the part of squares above, a filter of
 all gyroscopes was said to be in one of them."""
 
 SEES_EARTH = 20.0
@@ -119,10 +123,6 @@ MOVED = 1.0
 """Standard deviations from which what that moves is reported, and a parameter counts
 as moved."""
 
-LOOKED_AT = 0.01
-"""Probability below which an explanation, or that a window is bad, is not looked at: it
-moves no interval."""
-
 SUSPECT = MENTIONED
 """Probability that a window is bad from which it is reported."""
 
@@ -176,7 +176,7 @@ MAX_PROPOSED_POSITIONS = 4
 
 # -- which explanations are looked at
 
-VISIBLE = 1.0
+VISIBLE = MOVED
 """Standard deviations below which nothing shows: the column of a typical size in all
 rows together, an error of linearisation in a mean, a step after which turns need not be
 linearised again."""
@@ -197,12 +197,8 @@ ALTERNATIVE_LOG_DISTANCE = 6.0
 evaluated: what proves likelier by `PREDICTION_SLACK` is then one in twenty."""
 
 OFFERED_LOG_DISTANCE = 12.0
-"""Distance of an offer from the best, ln, up to which it is evaluated: one
-that is further behind has odds of 1 to 160 000."""
-
-COMPARED_LOG_DISTANCE = 20.0
-"""Distance from the best, ln, up to which a set is compared without a part of the rows:
-that part may be what decided against it."""
+"""Distance from the best, ln, up to which an offer is evaluated, and a set compared
+without a part of the rows: what is further behind has odds of 1 to 160 000."""
 
 PREDICTION_SLACK = 3.0
 """Log evidence that a full evaluation may add to the predicted score of an offer."""

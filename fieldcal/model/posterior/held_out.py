@@ -125,9 +125,7 @@ def held_out_residuals(fitted: FittedSet, sets: Sequence[Set]) -> Array:
 def candidate_sets(best: Set, visited: Sequence[Set]) -> list[Set]:
     """Sets that may be the best without a part: the best, those near it, the empty."""
     ranked = sorted(visited, key=lambda s: -s.score)
-    near = [
-        s for s in ranked if s.score > best.score - thresholds.COMPARED_LOG_DISTANCE
-    ]
+    near = [s for s in ranked if s.score > best.score - thresholds.OFFERED_LOG_DISTANCE]
     none = [s for s in ranked if not s.members]
     return list(dict.fromkeys([best, *near[: tolerances.MAX_COMPARED_SETS], *none]))
 

@@ -52,7 +52,7 @@ def force_turn_rate(acc: Array, length: float) -> ForceTurn:
     """
     known = np.isfinite(acc).all(axis=1)
     t = (np.linspace(-0.5, 0.5, len(acc)) * length)[known]
-    if len(t) < detections.MIN_DRIFT_SAMPLES:
+    if len(t) < detections.MIN_SAMPLES:
         return ForceTurn(0.0, np.inf)
     t -= t.mean()
     measured = acc[known]

@@ -55,7 +55,7 @@ def sway_variance(rate: Array, step: float) -> float:
 
     """
     n = len(rate)
-    if n < detections.MIN_SWAY_SAMPLES:
+    if n < detections.MIN_SAMPLES:
         return 0.0
     angle = np.cumsum((rate - rate.mean(axis=0)) * step, axis=0)
     line = np.linalg.qr(np.column_stack([np.ones(n), np.arange(n)]))[0]

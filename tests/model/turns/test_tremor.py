@@ -41,7 +41,7 @@ def test_noise_is_no_swaying() -> None:
 
 def test_of_a_few_samples_nothing_is_known() -> None:
     assert (
-        sway_variance(rates(2e-3, 1.6, 0.0, 1)[: detections.MIN_SWAY_SAMPLES - 1], STEP)
+        sway_variance(rates(2e-3, 1.6, 0.0, 1)[: detections.MIN_SAMPLES - 1], STEP)
         == 0.0
     )
 

@@ -200,7 +200,7 @@ def explain(
     begin = None if before is None else _starting_causes(before)
     found = Inference(fit).run(begin)
     posterior = _calculate_posterior(found)
-    for _ in range(0 if found.exhausted else tolerances.MAX_ITERATIONS):
+    for _ in range(0 if found.exhausted else tolerances.MAX_RESUMPTIONS):
         better, now = found.search.best_visited, found.best
         # the same causes, with shapes between the grid points, are no improvement
         if found.search.sets.corrected_score(better) <= now.score + (

@@ -64,13 +64,10 @@ LYING_NOISE_RATIO = 3.0
 """Times that noise which one shows in which the device lies still: in published
 recordings 2 at most on a table, 4 to 60 in a hand."""
 
-PUSHED_NOISE_RATIO = 1.5
+HELD_RATIO = 1.5
 """Times their quickest noise that accelerometers show where a hand pushes the device:
-on a table that trembles 1.3 at most in published recordings."""
-
-ACROSS_RATIO = 1.5
-"""Times the squares along the force that those across it have where the angle wanders,
-besides being too many."""
+on a table that trembles 1.3 at most in published recordings. And times the squares
+along the force that those across it have where its angle wanders."""
 
 # -- the base sways
 
@@ -190,10 +187,6 @@ NEAREST_NEIGHBOUR, FURTHEST_NEIGHBOUR = 5, 12
 STEEP_RATIO, SLOPE_POWER_SHARE = 4.0, 0.3
 """Multiple of the floor above which these neighbours replace it, and part of the power
 at a frequency that is below it on a slope; beside a line, less."""
-
-LEVEL_SIGMAS = 3.0
-"""Standard deviations above the level of noise from which that of one phase replaces
-it."""
 
 SHORT_STEP, SHORT_STEP_SHARE = 0.5, 0.01
 """Time step, in sampling periods, below which a step cannot be the device's own, and

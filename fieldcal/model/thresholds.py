@@ -70,9 +70,12 @@ ONE_LINE = 0.65
 """Part of the energy at a frequency that one amplitude and phase must take to be a
 line: a hand that trembles has another phase each time."""
 
-LINE_LASTS, LINE_LASTS_SIGMAS = 0.2, 3.0
-"""Part of a line in either half of the windows at least, but for so many sigmas: what
+LINE_LASTS = 0.2
+"""Part of a line in either half of the windows at least, but for `WITHIN_NOISE`: what
 fades after turns has lines as well."""
+
+WITHIN_NOISE = 3.0
+"""Standard deviations up to which a level, or a part of a line, may be off by noise."""
 
 MAX_CLIPPED_SHARE = 1e-3
 """Part of a window at the rail that makes its mean useless."""
@@ -223,13 +226,9 @@ MAX_SHAPE_LOG_SIGMA = 1.0
 CONVERGES_WITHIN_RAD = 0.3
 """Error of an angle from which the linearisation converges to the right one, rad."""
 
-ALIKE_FORCES = 0.05
-"""Difference of two forces' errors, of gravity, below which the smaller turn is the
-likelier: three degrees."""
-
-EXCHANGED_WITHIN = 0.05
-"""Distance from the angles of another position, of that between the two, up to which a
-position counts as held there."""
+ALIKE = 0.05
+"""Difference of two forces, of gravity, or of angles from those of another position, of
+the distance between the two, up to which places are alike: three degrees."""
 
 MAX_MISCLOSURE_RAD = 0.3
 """Largest closure that gyroscope errors can make, rad. A larger one means that outputs

@@ -13,8 +13,8 @@ ROUNDING = 1e-12
 2e-16, and sums of some thousand terms lose up to four digits."""
 
 ACCUMULATED_ROUNDING = 1e-6
-"""The same of what went through many solutions, as the logarithm of an evidence: less
-of a difference is none, and nothing is told by less than this part of it."""
+"""The same of what was rounded often, as the logarithm of an evidence, or stamps of
+samples in their interval: less of a difference is none."""
 
 SINGULAR = 1e-9
 """Eigenvalue of a matrix of squares, of its largest, below which it is rounding."""
@@ -26,9 +26,6 @@ has four digits, and what is calculated nine."""
 
 MIN_POWER = ROUNDING**2
 """Power below which a channel repeats its reference, in its unit squared."""
-
-STAMP_ROUNDING = 1e-6
-"""Part of the interval of samples by which rounding has stamps be off even times."""
 
 NO_WEIGHT_NOISE = 1e5
 """Factor on the noise of a row that must not count: a weight of 1e-10, which no row
@@ -75,9 +72,12 @@ MIN_SCALE_CHANGE = 0.01
 linearisation is its square: 1e-4, and 1e-8 after the last integration."""
 
 MAX_ITERATIONS = 30
-"""Of what converges by itself: steps of Gauss and Newton for one set, integrations of
-turns, steps of a search and its resumptions. The limit is for rows that contradict
-themselves."""
+"""Of what converges by itself, in little time: steps of a search, of bands of noise and
+of a hand's drift. The limit is for rows that contradict themselves."""
+
+MAX_RELINEARISATIONS = 6
+"""Steps of Gauss and Newton for one set, and integrations of turns. With 30, nothing
+changes in 23 sessions; rows that contradict themselves would take longer."""
 
 MAX_SIZE_ROUNDS = 5
 """Passes over all sizes of a set, each at the others' best. A recording of an
@@ -86,6 +86,10 @@ named does not."""
 
 MAX_LINEARISATIONS = 8
 """Linearisations of one inference; of sets that alternate, the likelier is kept."""
+
+MAX_RESUMPTIONS = 2
+"""Times that a search is resumed from an alias that proved better. With 30, nothing
+changes in 23 sessions; each takes as long as a search."""
 
 MAX_CORRECTIONS = 3
 """Iterations of the other errors of gyroscopes; each leaves 1 % of the error."""

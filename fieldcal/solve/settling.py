@@ -105,7 +105,7 @@ def _settled_state(
     nominal = np.append(state.scale[:3], fit.nominal.scale[3:])
     state = replace(state, scale=nominal)
     state, values = _follow_turns_first(fit, parameter_set, state, values)
-    for again in range(tolerances.MAX_ITERATIONS):
+    for again in range(tolerances.MAX_RELINEARISATIONS):
         if again:
             fit.follow_turns(state, values)
         before = state.scale

@@ -101,7 +101,7 @@ def exchanged_positions(
 def _is_at(held: Array, elsewhere: Array, stated: Array) -> bool:
     """Whether angles are those stated elsewhere, and not those stated, rad."""
     off, apart = wrap_angle(held - elsewhere), wrap_angle(held - stated)
-    return bool(np.abs(off).max() < thresholds.EXCHANGED_WITHIN * np.abs(apart).max())
+    return bool(np.abs(off).max() < thresholds.ALIKE * np.abs(apart).max())
 
 
 def single_errors(explanation: Explanation, member: Member) -> list[Group]:

@@ -25,7 +25,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Mask
 from fieldcal.diagnosis.signal.noise_level import noise_level
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
-from fieldcal.model import detections, resolutions, tolerances
+from fieldcal.model import detections, resolutions, thresholds, tolerances
 
 CHANNEL_GROUPS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
 """Channels that are searched together for a line of one phase."""
@@ -101,7 +101,7 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     # electronics may disturb one output alone, motion of the base disturbs a triad
     groups = [(*windows.channel_groups, *triads), tuple(triads)]
     variance = _neighbour_variance(windows, pieces)
-    sure = 1 + detections.LEVEL_SIGMAS / np.sqrt(max(len(pieces.samples) - 1, 1))
+    sure = 1 + thresholds.WITHIN_NOISE / np.sqrt(max(len(pieces.samples) - 1, 1))
     for frame, channel_groups in zip(frames, groups, strict=False):
         power, tremor, hz = _coherent_power(pieces, frame)
         noise = np.array([np.interp(hz, windows.hz, row) for row in variance])

@@ -200,7 +200,7 @@ def _in_both_halves(pieces: WindowSamples, tone: SpectralLine) -> bool:
                 taken[half] += (fallen / pieces.noise[clear] ** 2).sum()
     # the part of E in one half has the standard deviation 2 sqrt(E / 2)
     sigma = 2 * np.sqrt(max(float(taken.sum()), 0.0) / 2)
-    most = taken.min() + thresholds.LINE_LASTS_SIGMAS * sigma
+    most = taken.min() + thresholds.WITHIN_NOISE * sigma
     return bool(most > thresholds.LINE_LASTS * taken.sum())
 
 

@@ -142,7 +142,7 @@ def force_wander_angle(rows: Rows) -> float:
         angle.append(((off - part) ** 2).sum() / (2 * free) / length**2)
     across, along, dof = np.sum(sorted(squares, key=lambda s: s[0] / s[2])[:-1], axis=0)
     if across / 2 < max(
-        dof + thresholds.DECIDES * np.sqrt(dof), detections.ACROSS_RATIO * along
+        dof + thresholds.DECIDES * np.sqrt(dof), detections.HELD_RATIO * along
     ):
         return 0.0
     return float(np.sqrt(np.mean(angle)))

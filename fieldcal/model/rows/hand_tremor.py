@@ -66,9 +66,7 @@ def rows_of_recording(source: RowSource) -> Rows:
         in_hand = _add_hand_motion(
             source, reduce_to_rows(source, whole=True, level=noise), angle
         )
-        pushed = (
-            rows.noise[:3] > detections.PUSHED_NOISE_RATIO * in_hand.noise[:3]
-        ).any()
+        pushed = (rows.noise[:3] > detections.HELD_RATIO * in_hand.noise[:3]).any()
         return in_hand if angle or pushed else _separate_triads(source, in_hand)
     trembling = trembling_windows(rows, pieces, source.rate)
     if not trembling.any():

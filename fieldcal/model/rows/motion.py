@@ -317,4 +317,4 @@ def _stamp_errors(t: Array, stretches: Sequence[Index]) -> Array:
             off.append(stamps - count * (count @ stamps) / max(count @ count, 1.0))
     out: Array = np.concatenate(off)
     step = float(np.median(np.diff(t)))
-    return np.where(np.abs(out) > tolerances.STAMP_ROUNDING * step, out, 0.0)
+    return np.where(np.abs(out) > tolerances.ACCUMULATED_ROUNDING * step, out, 0.0)

@@ -154,7 +154,7 @@ class GaussNewton:
     ) -> tuple[State, Array, Set]:
         """The state at the estimate of a set, by Gauss and Newton, and that set."""
         state, values = self._near_set_angles(state, self.pad(values), members)
-        for _ in range(tolerances.MAX_ITERATIONS):
+        for _ in range(tolerances.MAX_RELINEARISATIONS):
             settled, _ = self.estimate(state, values, members, sizes)
             sizes = settled.sizes
             before = values

@@ -46,7 +46,7 @@ def starting_angles(rows: Rows, nominal: State, position: int) -> Array:
         return nearest
     grid = _grid()
     off = errors(grid)
-    likely = _turn(stated, grid[off <= off.min() + thresholds.ALIKE_FORCES])
+    likely = _turn(stated, grid[off <= off.min() + thresholds.ALIKE])
     least: Array = likely[np.abs(likely).sum(axis=1).argmin()]
     return least
 

@@ -267,7 +267,7 @@ def test_where_nothing_turned_no_turn_is_foretold() -> None:
 
 
 def test_sets_that_are_compared_are_the_best_and_the_likeliest_beside_it() -> None:
-    """Six within twenty of it, each once, and the empty set however unlikely."""
+    """Six within twelve of it, each once, and the empty set however unlikely."""
 
     @dataclass(eq=False)
     class Scored:
@@ -277,8 +277,8 @@ def test_sets_that_are_compared_are_the_best_and_the_likeliest_beside_it() -> No
     def one(score: float, members: int = 1) -> Set:
         return cast(Set, Scored(score, (None,) * members))
 
-    best, empty, far = one(10.0), one(-500.0, 0), one(-10.1)
-    near = [one(10.0 - 2.8 * k) for k in (3, 1, 2, 7)]
+    best, empty, far = one(10.0), one(-500.0, 0), one(-2.1)
+    near = [one(10.0 - 2.8 * k) for k in (3, 1, 2, 4)]
     found = candidate_sets(best, [far, empty, *near, best])
     ranked = [near[1], near[2], near[0], near[3]]
     assert found == [best, *ranked, empty]

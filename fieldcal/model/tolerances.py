@@ -101,14 +101,16 @@ FREQUENCY_STEPS = 4
 
 EVALUATED = 4
 """Of what was ranked by a prediction, the best that are evaluated in full: offers and
-pairs at each step of a search, and states about which scores are corrected."""
+pairs at each step of a search, and states about which scores are corrected. With two or
+eight, no probability moves by 0.02 in a session of nine positions and one by hand."""
 
 MAX_COMPARED_SETS = 6
 """Sets that are compared again without a part of the rows. With four, the rms of
 a prediction changes by 9 % in one channel of a recording at rest."""
 
 PAIRED_CAUSES = 16
-"""Causes of which pairs are tried: 120 pairs."""
+"""Causes of which pairs are tried: 120 pairs. With eight, nothing changes in a session
+of nine positions and in one by hand."""
 
 MAX_OFFERED_COLUMNS = 60
 """Columns used to predict the gain by a group: three axes of twenty cosines each."""

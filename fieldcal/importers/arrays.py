@@ -33,6 +33,7 @@ from fieldcal.importing.arrays.array_tables import (
     numpy_tables,
     tables_of,
 )
+from fieldcal.importing.arrays.device_rows import device_rows
 from fieldcal.importing.arrays.matlab_objects import holds_objects, object_tables
 from fieldcal.importing.arrays.paired_tables import ArrayPairing, pair_arrays
 from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
@@ -78,8 +79,10 @@ class ArrayFile(ColumnRecording):
     """Of the arrays of an HDF5 file, so that it is looked through once."""
     group = ""
     """The only group that is read, where each of several holds an IMU."""
-    _parts: dict[str, Self] | None = None
-    """The file with one such group alone, by the name of its IMU."""
+    device = ""
+    """The only device that is read, where a column tells the rows of several apart."""
+    parts_found: dict[str, Self] | None = None
+    """The file with one such group or device alone, by the name of its IMU."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
@@ -87,7 +90,7 @@ class ArrayFile(ColumnRecording):
 
     def imus(self) -> dict[str, ReadOptions]:
         """Options of each IMU, of which each may lie in a group of its own."""
-        if self.imus_found is None and (parts := self._by_group()):
+        if self.imus_found is None and (parts := self._in_parts()):
             self.imus_found = {}
             for name, part in parts.items():
                 (wanted,) = part.imus().values()
@@ -97,24 +100,27 @@ class ArrayFile(ColumnRecording):
         return super().imus()
 
     def alone(self, stream: str) -> Recording:
-        """The recording of one IMU, as far as it has a group of its own."""
-        return self._by_group().get(stream) or super().alone(stream)
+        """The recording of one IMU, as far as it has a group or rows of its own."""
+        return self._in_parts().get(stream) or super().alone(stream)
 
-    def _by_group(self) -> dict[str, Self]:
-        """The file with one group alone, where several hold an IMU each."""
-        if self._parts is None:
-            groups: dict[str, str] = {}
-            if not (self.wanted.columns or self.group):
-                with self._arrays() as tables:
-                    groups = imu_groups(tables)
-            self._parts = {
-                name: self._of_group(group) for name, group in groups.items()
+    def _in_parts(self) -> dict[str, Self]:
+        """The file with one group or device alone, where there are several."""
+        if self.parts_found is None:
+            self.parts_found = {}
+            with self._arrays() as tables:
+                groups = {} if self.wanted.columns or self.group else imu_groups(tables)
+                devices = {} if groups or self.device else device_rows(tables).of
+            self.parts_found |= {
+                n: self._part(group=group) for n, group in groups.items()
             }
-        return self._parts
+            self.parts_found |= {name: self._part(device=name) for name in devices}
+        return self.parts_found
 
-    def _of_group(self, group: str) -> Self:
+    def _part(self, group: str = "", device: str = "") -> Self:
+        """The file with one group or one device alone."""
         one = copy(self)
-        one.says, one.mended, one.guessed, one.group = [], [], {}, group
+        one.says, one.mended, one.guessed, one.parts_found = [], [], {}, None
+        one.group, one.device = group or self.group, device
         return one
 
     def heading(self) -> list[Heading]:
@@ -228,6 +234,13 @@ class ArrayFile(ColumnRecording):
 
     @contextmanager
     def _arrays(self) -> Iterator[dict[str, ArrayTable]]:
+        """Every array of numbers in the file, with the rows of one device."""
+        with self._whole_arrays() as tables:
+            one = self.device
+            yield device_rows(tables).alone(one, tables) if one else tables
+
+    @contextmanager
+    def _whole_arrays(self) -> Iterator[dict[str, ArrayTable]]:
         """Every array of numbers in the file, as it lies there."""
         if self._loaded is not None:
             yield arrays_in_group(self.group, self._loaded)

@@ -27,7 +27,11 @@ from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.tables.text_heading import TextHeading
-from fieldcal.importing.text.instances import ImuInstances, find_instances
+from fieldcal.importing.text.instances import (
+    ImuInstances,
+    find_instances,
+    named_columns,
+)
 from fieldcal.importing.text.number_table import NumberTable
 from fieldcal.importing.text.receiver_lines import corrected_messages
 from fieldcal.importing.text.text_form import TextForm
@@ -286,9 +290,14 @@ class TextColumns(ColumnRecording):
     def _in_turn(self) -> ImuInstances | None:
         """What tells several IMUs apart whose rows come in turn."""
         first = next((top_lines(d) for d in self._text.pieces(self._forms)), [])
-        found = find_instances(first, self.wanted.separator)
-        if found is not None:
-            found = found.over(map(split_lines, self._text.pieces(self._forms)))
+        parted = self.wanted.separator
+        found = find_instances(first, parted)
+        ways = [found] if found is not None else named_columns(first, parted)
+        whole = (
+            one.over(map(split_lines, self._text.pieces(self._forms))) for one in ways
+        )
+        fits = (one for one in whole if found or one.are_several)
+        found = next(fits, None)
         self.says += found.says if found is not None else []
         return found
 

@@ -94,7 +94,7 @@ class JsonLog(ArrayFile):
         return (), ""
 
     @contextmanager
-    def _arrays(self) -> Iterator[dict[str, ArrayTable]]:
+    def _whole_arrays(self) -> Iterator[dict[str, ArrayTable]]:
         """Every list of numbers in the file."""
         if self._loaded is None:
             text = b"".join(as_utf8(self.pieces())).decode(errors="replace")

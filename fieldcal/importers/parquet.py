@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -17,9 +19,16 @@ from fieldcal.importing import columns
 from fieldcal.importing.arrays.nested_arrow import flat_batches, flat_name
 from fieldcal.importing.files.gzip_stream import unpacked_file
 from fieldcal.importing.headings.heading import Column, Heading
-from fieldcal.importing.recording import ROWS
+from fieldcal.importing.read_options import ReadOptions
+from fieldcal.importing.recording import ROWS, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
+from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
+from fieldcal.importing.words.device_names import (
+    may_count,
+    tells_devices,
+    tells_wearers,
+)
 from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.session.arrow_columns import float_values
 from fieldcal.session.sample_files import BYTES_AT_ONCE
@@ -40,7 +49,68 @@ def recognises(head: bytes, path: Path) -> bool:
 
 
 class ParquetFile(ColumnRecording):
-    """A table with named columns, with one IMU in it or several side by side."""
+    """A table with named columns, with one IMU in it or several.
+
+    Attributes
+    ----------
+    device : column and text of its cells in the rows that are read, where a column
+        tells the rows of several devices apart
+
+    """
+
+    device: tuple[str, str] | None = None
+    parts_found: dict[str, Self] | None = None
+    """The file with the rows of one device alone, by its name."""
+
+    def imus(self) -> dict[str, ReadOptions]:
+        """Options of each IMU, of which each may have rows of its own."""
+        if self.imus_found is None and (parts := self._in_parts()):
+            self.imus_found = {}
+            for name, part in parts.items():
+                (wanted,) = part.imus().values()
+                self.imus_found[name] = wanted
+                part.imus_found = {name: wanted}
+                self.says += [s for s in part.says if s not in self.says]
+        return super().imus()
+
+    def alone(self, stream: str) -> Recording:
+        """The recording of one IMU, as far as it has rows of its own."""
+        return self._in_parts().get(stream) or super().alone(stream)
+
+    def _in_parts(self) -> dict[str, Self]:
+        """The file with the rows of one device alone, where there are several."""
+        if self.parts_found is None:
+            self.parts_found = {}
+            if self.device is None:
+                self.parts_found = {
+                    n: self._part(at) for n, at in self._devices().items()
+                }
+        return self.parts_found
+
+    def _part(self, device: tuple[str, str]) -> Self:
+        one = copy(self)
+        one.says, one.mended, one.guessed, one.parts_found = [], [], {}, None
+        one.device = device
+        return one
+
+    def _devices(self) -> dict[str, tuple[str, str]]:
+        """Column and text by which the rows of each device are told."""
+        with self._batches() as (schema, _):
+            named = [
+                field.name
+                for tells in (tells_devices, tells_wearers)
+                for field in schema
+                if tells(field.name) and _may_name(field)
+            ]
+        for name in named:
+            with self._batches(only=name) as (_, batches):
+                many: Counter[str] = Counter()
+                for batch in batches:
+                    many.update(_texts(batch.column(name)).to_pylist())
+            many.pop(None, None)  # type: ignore[call-overload]
+            if 1 < len(many) <= MAX_NAMED:
+                return {n: (name, n) for n, rows in many.items() if rows >= MIN_ROWS}
+        return {}
 
     def heading(self) -> list[Heading]:
         """Names of its columns, with their units."""
@@ -81,8 +151,30 @@ class ParquetFile(ColumnRecording):
         self.says += [s for s in samples.says if s not in self.says]
 
     @contextmanager
-    def _batches(self, every: bool = False) -> Iterator[tuple[Any, Iterator[Any]]]:
-        """Schema of its columns, and its batches: of `every` column or those wanted."""
+    def _batches(
+        self, every: bool = False, only: str = ""
+    ) -> Iterator[tuple[Any, Iterator[Any]]]:
+        """Schema of its columns, and its batches, with the rows of one device.
+
+        Of `every` column, of `only` one, or of those wanted.
+        """
+        with self._whole_batches(every, only) as (schema, batches):
+            yield schema, map(self._rows_of_device, batches) if self.device else batches
+
+    def _rows_of_device(self, batch: Any) -> Any:
+        """Rows of the only device that is read."""
+        import pyarrow.compute as pc
+
+        if self.device is None:
+            return batch
+        name, device = self.device
+        return batch.filter(pc.equal(_texts(batch.column(name)), device))
+
+    @contextmanager
+    def _whole_batches(
+        self, every: bool, only: str
+    ) -> Iterator[tuple[Any, Iterator[Any]]]:
+        """Schema of its columns, and its batches, with the rows of all devices."""
         import pyarrow as pa
         import pyarrow.parquet
 
@@ -97,7 +189,9 @@ class ParquetFile(ColumnRecording):
                     )  # fmt: skip
                     schema = opened.schema_arrow
                     one: dict[str, Any] = {"use_threads": False}
-                    if self.wanted.columns and not every:
+                    if only:
+                        one["columns"] = [only]
+                    elif self.wanted.columns and not every:
                         one["columns"] = self._needed(schema.names)
                     yield flat_batches(schema, opened.iter_batches(ROWS, **one))
                 elif magic == FEATHER:
@@ -123,6 +217,7 @@ class ParquetFile(ColumnRecording):
         """Columns of the file in which those wanted lie; all if one is not there."""
         pairs = [c.partition("=") for c in self.wanted.columns]
         there = {flat_name(name or column, names): None for column, _, name in pairs}
+        there |= {self.device[0]: None} if self.device else {}
         return [*there] if there.keys() <= {*names} else [*names]
 
     def _named(self, schema: Any) -> dict[str, str]:
@@ -179,6 +274,23 @@ def _gathered(batches: Iterable[Any]) -> Iterator[Any]:
             waiting = []
     if waiting:
         yield from pa.Table.from_batches(waiting).combine_chunks().to_batches()
+
+
+def _may_name(field: Any) -> bool:
+    """Whether a column that is named so holds names or numbers of devices."""
+    import pyarrow as pa
+
+    kind = field.type
+    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+    counts = bool(pa.types.is_integer(kind))
+    return (counts and not may_count(field.name)) or _is_text(kind)
+
+
+def _texts(column: Any) -> Any:
+    """A column of names or whole numbers as texts."""
+    import pyarrow as pa
+
+    return column.cast(pa.string())
 
 
 def _is_text(kind: Any) -> bool:

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.text.instances import tells_devices
 from fieldcal.importing.times.clock_text import is_clock
+from fieldcal.importing.words.device_names import tells_devices
 from fieldcal.importing.words.heading_words import (
     bare_axis,
     heading_meaning,

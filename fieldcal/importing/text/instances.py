@@ -1,14 +1,19 @@
-"""Rows of several IMUs in one text, in turn, with a column that says which.
+"""Rows of several IMUs in one text, with a column that says which.
 
 imu,t,ax,ay,az                     the column's name says that it tells devices
 1,0.00,0.1,0.2,9.8                 apart, or it holds words; rows of all of them
 2,0.00,0.1,0.3,9.7                 come in turn, about as many of each. Numbers without
                                    a name tell them if what stands beside differs
+
+t,ax,ay,az,device                  where the rows of one device come behind those of
+0.00,0.1,0.2,9.8,left              another, only the column's name tells; of several
+…                                  such columns the first that is not the same in all
+0.00,0.1,0.3,9.7,right             rows, those that name devices before those that name
+                                   who wore them
 """
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -22,16 +27,20 @@ from fieldcal.importing.text.text_top import (
     parse_numbers,
     split_cells,
 )
-
-NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "addr",
-         "unit", "idx", "dev", "mac", "module", "devicename", "设备名称"}  # fmt: skip
-"""Names of columns that tell devices apart, without "id" at their end."""
+from fieldcal.importing.words.device_names import (
+    may_count,
+    tells_devices,
+    tells_wearers,
+)
 
 FEWEST_COLUMNS = 3
 """Columns behind the name of an IMU: of its axes; one of them may be a time."""
 
 MAX_INSTANCES = 16
-"""IMUs of one log."""
+"""IMUs of one log whose rows come in turn."""
+
+MAX_NAMED = 100
+"""IMUs of a file that a column tells apart by its name: what has more values counts."""
 
 MIN_ROWS = 20
 """Rows of each among the first."""
@@ -56,6 +65,7 @@ class ImuInstances(NamedTuple):
     separator : of columns
     names : cells of that column, in the order in which they come
     silent : cells of those whose rows hold only zeros, which are left out
+    few : cells of those that have hardly any rows, which are left out
 
     """
 
@@ -63,11 +73,16 @@ class ImuInstances(NamedTuple):
     separator: str | None
     names: tuple[str, ...]
     silent: tuple[str, ...] = ()
+    few: tuple[str, ...] = ()
 
     @property
     def says(self) -> list[str]:
         """What the user must know, a sentence each."""
-        return [f"{name} holds only zeros: it is left out" for name in self.silent]
+        return [
+            *(f"{name} holds only zeros: it is left out" for name in self.silent),
+            *(f"{name} has fewer than {MIN_ROWS} rows: it is left out"
+              for name in self.few),
+        ]  # fmt: skip
 
     def over(self, pieces: Iterable[Sequence[str]]) -> ImuInstances:
         """The same by a whole file, in which one of them may come late.
@@ -86,12 +101,23 @@ class ImuInstances(NamedTuple):
                     continue
                 name = row[self.column].strip().strip('"')
                 many[name] += 1
-                if name not in live and _moves(row[self.column + 1 :]):
+                if name not in live and _moves(self._beside(row)):
                     live.add(name)
         late = [n for n in many if n in live and many[n] >= MIN_ROWS]
         names = dict.fromkeys((*self.names, *late))
         silent = tuple(name for name in self.silent if name not in names)
-        return self._replace(names=tuple(names), silent=silent)
+        few = tuple(n for n in many if n in live and n not in names)
+        return self._replace(names=tuple(names), silent=silent, few=few)
+
+    @property
+    def are_several(self) -> bool:
+        """Whether the cells name several devices, and not the sensors of one."""
+        return 1 < len(self.names) <= MAX_NAMED and not _are_sensors(self.names)
+
+    def _beside(self, row: Sequence[str]) -> Sequence[str]:
+        """Cells behind the name; those before it where hardly any are behind."""
+        behind = row[self.column + 1 :]
+        return behind if len(behind) >= FEWEST_COLUMNS else row[: self.column]
 
     def only(self, name: str, lines: Sequence[str]) -> list[str]:
         """Lines of one IMU, and those that are none of any."""
@@ -100,7 +126,7 @@ class ImuInstances(NamedTuple):
     def _cell(self, line: str) -> str | None:
         row = line.split(self.separator)
         cell = row[self.column].strip().strip('"') if len(row) > self.column else ""
-        return cell if cell in (*self.names, *self.silent) else None
+        return cell if cell in (*self.names, *self.silent, *self.few) else None
 
 
 def find_instances(lines: Sequence[str], separator: str | None) -> ImuInstances | None:
@@ -108,15 +134,9 @@ def find_instances(lines: Sequence[str], separator: str | None) -> ImuInstances 
     if not lines:
         return None
     parted = separator or find_separator(lines[-1])
-    rows = [split_cells(line, parted) for line in lines]
-    width = len(rows[-1])
-    whole = [row for row in rows if len(row) == width]
-    numbers: list[list[str]] = []
-    above: list[list[str]] = []
-    for row in whole:
-        values = sum(is_number(cell, parted != ",") for cell in row)
-        (numbers if values > 1 else above).append(row)
-    for i in range(width):
+    numbers, above = _rows_of(lines, parted)
+    found: list[tuple[bool, ImuInstances]] = []
+    for i in range(len((numbers or above)[-1])):
         column = [row[i] for row in numbers]
         named = any(tells_devices(row[i]) for row in above)
         words = not any(is_number(cell, False) for cell in column)
@@ -130,8 +150,44 @@ def find_instances(lines: Sequence[str], separator: str | None) -> ImuInstances 
             zeros = [name for name in names if _is_silent(numbers, i, name)]
             silent = zeros if len(zeros) < len(names) else []
             live = tuple(name for name in names if name not in silent)
-            return ImuInstances(i, parted, live, tuple(silent))
-    return None
+            found.append((named, ImuInstances(i, parted, live, tuple(silent))))
+    # two devices may be of one model
+    best = max(found, key=lambda one: (one[0], len(one[1].names)), default=None)
+    return best[1] if best is not None else None
+
+
+def named_columns(lines: Sequence[str], separator: str | None) -> list[ImuInstances]:
+    """Columns whose names say that they tell IMUs apart, whose rows may lie apart.
+
+    With the names that are among these lines, of which there may be one.
+    """
+    if not lines:
+        return []
+    parted = separator or find_separator(lines[-1])
+    numbers, above = _rows_of(lines, parted)
+    found = []
+    for tells in (tells_devices, tells_wearers):
+        for i in range(len(numbers[-1]) if numbers else 0):
+            names = dict.fromkeys(row[i] for row in numbers)
+            counted = all(is_number(name, False) for name in names)
+            said = [row[i] for row in above if tells(row[i])]
+            if said and not (counted and any(map(may_count, said))):
+                found.append(ImuInstances(i, parted, tuple(names)))
+    return found
+
+
+def _rows_of(
+    lines: Sequence[str], separator: str | None
+) -> tuple[list[list[str]], list[list[str]]]:
+    """Rows of numbers, and those of words, that are as wide as the last line."""
+    rows = [split_cells(line, separator) for line in lines]
+    numbers: list[list[str]] = []
+    above: list[list[str]] = []
+    for row in rows:
+        if len(row) == len(rows[-1]):
+            values = sum(is_number(cell, separator != ",") for cell in row)
+            (numbers if values > 1 else above).append(row)
+    return numbers, above
 
 
 def _numbers_devices(
@@ -153,12 +209,6 @@ def _numbers_devices(
     beside, own = (np.median(np.abs(table[n:] - table[:-n]), axis=0)
                    for n in (1, many))  # fmt: skip
     return int((beside > APART * own).sum()) >= FEWEST_COLUMNS
-
-
-def tells_devices(name: str) -> bool:
-    """Whether a name is that of a column or field that identifies devices."""
-    bare = re.sub(r"[\s_.-]+", "", name.lower().lstrip("#%/ "))
-    return bare in NAMES or (bare.endswith("id") and bare[:-2] in NAMES)
 
 
 def _are_sensors(column: Sequence[str]) -> bool:

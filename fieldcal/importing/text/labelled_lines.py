@@ -19,7 +19,6 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Sequence
 
-from fieldcal.importing.text.instances import tells_devices
 from fieldcal.importing.text.labels import (
     CLOCKS,
     Labelled,
@@ -34,6 +33,7 @@ from fieldcal.importing.text.repeated_lines import (
     repeated_shapes,
 )
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, take_row
+from fieldcal.importing.words.device_names import tells_devices
 from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.importing.words.sensor_words import AXES
 

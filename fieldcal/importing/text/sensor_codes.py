@@ -20,10 +20,10 @@ from typing import Self
 import numpy as np
 
 from fieldcal.core.gravity import G0
-from fieldcal.importing.text.instances import tells_devices
 from fieldcal.importing.text.tagged_lines import SENSORS
 from fieldcal.importing.text.text_form import Reader, TextForm
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
+from fieldcal.importing.words.device_names import tells_devices
 from fieldcal.importing.words.heading_words import words_in_name
 from fieldcal.importing.words.sensor_words import AXES
 

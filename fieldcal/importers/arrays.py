@@ -224,7 +224,8 @@ class ArrayFile(ColumnRecording):
         """Every array of numbers in the file, those of one IMU side by side."""
         with self._arrays() as tables:
             if self._pairing is None:
-                self._pairing = (pair_arrays(tables),)
+                with self.named_errors():
+                    self._pairing = (pair_arrays(tables),)
             (paired,) = self._pairing
             if paired is None:
                 yield tables

@@ -304,7 +304,8 @@ class TextColumns(ColumnRecording):
     @cached_property
     def _forms(self) -> list[TextForm]:
         """What must be undone before the text is one of columns."""
-        return forms_of(self._top, self.wanted.separator)
+        with self.named_errors():
+            return forms_of(self._top, self.wanted.separator)
 
     @cached_property
     def _top(self) -> list[str]:

@@ -100,8 +100,9 @@ class JsonLog(ArrayFile):
             text = b"".join(as_utf8(self.pieces())).decode(errors="replace")
             document = self._document(text)
             self._scalars = dict(named_scalars(document))
-            lists = json_lists(document, says=self.says)
-            self._loaded = {name: table_of(values) for name, values in lists}
+            with self.named_errors():
+                lists = json_lists(document, says=self.says)
+                self._loaded = {name: table_of(values) for name, values in lists}
         yield arrays_in_group(self.group, self._loaded)
 
     def _document(self, text: str) -> Any:

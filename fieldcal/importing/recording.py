@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -201,6 +202,14 @@ class Recording(ABC):
                 f"{self.path}: {where}: {what}; copy the file again, or {mend} with"
                 " --repair"
             )
+
+    @contextmanager
+    def named_errors(self) -> Iterator[None]:
+        """Name the file in what is wrong with what it holds."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{self.path}: {error}") from error
 
     def damaged(self, where: str, what: str) -> None:
         """Refuse a damaged place, or take note that it was left out.

@@ -13,9 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Index
 from fieldcal.importing.arrays.array_tables import ArrayTable, columns_of
 from fieldcal.importing.times.alignment import nearest_in_time
+from fieldcal.importing.times.clock_ratio import clock_ratio, say_apart, say_ratio
 from fieldcal.importing.words.heading_words import HeadingMeaning, heading_meaning
 
 KINDS = {"a": "accelerometer", "g": "gyroscope", "temperature": "thermometer"}
@@ -90,6 +92,12 @@ def pair_arrays(tables: Mapping[str, ArrayTable]) -> ArrayPairing | None:
     """Pair the arrays of sensors that have separate times.
 
     None where they have the same, or where no names and no times tell.
+
+    Raises
+    ------
+    InputError
+        If the accelerometer and the gyroscope have no times in common.
+
     """
     named = _by_kind(tables)
     own = {kind: _with_clock(kind, tables, named) for kind in KINDS}
@@ -100,7 +108,14 @@ def pair_arrays(tables: Mapping[str, ArrayTable]) -> ArrayPairing | None:
     for kind, one in others.items():
         if not _have_own_times(acc, one):
             continue
-        found, apart = nearest_in_time(acc.t, one.t)
+        ratio = clock_ratio(acc.t, one.t)
+        if ratio is None and kind == "g":
+            raise InputError(
+                say_apart(acc.t, one.t, "its accelerometer", "its gyroscope")
+            )
+        t = one.t * (ratio or 1.0)
+        says += say_ratio(ratio or 1.0, f"its {KINDS[kind]}")
+        found, apart = nearest_in_time(acc.t, t)
         if kind == "g":
             near = apart <= np.median(np.diff(acc.t)) / 2
             found = np.where(near, found, NOTHING)

@@ -92,7 +92,7 @@ def _fields(
             f"of its records, those of {pair.acc} are taken, each with the nearest of"
             f" {pair.gyr}"
         )
-        says += [pair.says] if pair.says else []
+        says += pair.says
         yield from pair.fields.items()
         return
     for prefix, fields in kinds.items():

@@ -16,8 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Index
 from fieldcal.importing.times.alignment import nearest_in_time
+from fieldcal.importing.times.clock_ratio import clock_ratio, say_apart, say_ratio
 from fieldcal.importing.times.gravity_sum import lacks_gravity
 from fieldcal.importing.words.file_names import best_name, part_of_force
 from fieldcal.importing.words.heading_words import heading_meaning, words_in_name
@@ -33,11 +35,18 @@ class MatchedRecords(NamedTuple):
     fields: dict[str, Array]
     acc: str
     gyr: str
-    says: str
+    says: tuple[str, ...]
 
 
 def pair_records(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
-    """Pair the records of both sensors of one IMU; None if there are no such kinds."""
+    """Pair the records of both sensors of one IMU; None if there are no such kinds.
+
+    Raises
+    ------
+    InputError
+        If the sensors have no times in common.
+
+    """
     acc, gyr = (best_name(sensor, kinds) for sensor in ("acc", "gyr"))
     if acc is None or gyr is None:
         return None
@@ -46,14 +55,19 @@ def pair_records(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
     clock = next((name for name in _times(force) if name in _times(rate)), None)
     if clock is None or not all(axes):
         return None
-    t = force[clock]
-    if len(t) < len(AXES) or (near := _Nearest.of(t, rate[clock])) is None:
+    t, late = force[clock], rate[clock]
+    if len(t) < len(AXES) or not np.isfinite(late).any():
+        return None
+    if (ratio := clock_ratio(t, late)) is None:
+        raise InputError(say_apart(t, late, acc, gyr))
+    if (near := _Nearest.of(t, late * ratio)) is None:
         return None
     found = {name: force[name] for name in _times(force)}
     found |= {f"acc_{axis}": force[name] for axis, name in axes[0].items()}
     for axis, name in axes[1].items():
         found[f"gyr_{axis}"] = near.values(rate[name])
-    return MatchedRecords(found, acc, gyr, _add_gravity(found, kinds, clock))
+    says = [*say_ratio(ratio, gyr), _add_gravity(found, kinds, clock)]
+    return MatchedRecords(found, acc, gyr, tuple(filter(None, says)))
 
 
 def _add_gravity(

@@ -20,9 +20,14 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple, Self
 
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 from fieldcal.importing.text.nearest_lines import NearestLines
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
+from fieldcal.importing.times.clock_ratio import clock_ratio, say_apart, say_ratio
 from fieldcal.importing.words.heading_units import parse_unit, sensor_of_unit
 from fieldcal.importing.words.heading_words import (
     bare_axis,
@@ -80,9 +85,11 @@ class TaggedLines(TextForm):
         acc: LineKind,
         gyr: LineKind | None,
         time: int,
+        ratio: float = 1.0,
     ) -> None:
         self._separator, self._place = separator, place
         self._acc, self._gyr, self._time = acc, gyr, time
+        self._ratio = ratio
         self.names = _named(acc, "acc" if gyr else "")
         if gyr is not None and self.names:
             own = _named(gyr, "gyr")
@@ -90,11 +97,19 @@ class TaggedLines(TextForm):
         what = f"of its lines, those that say {acc.word}"
         if gyr is not None:
             what += f" are taken, each with the nearest that says {gyr.word}"
-        self.says = what if gyr is not None else f"{what} are taken"
+        told = say_ratio(ratio, gyr.word) if gyr is not None else []
+        self.says = "; ".join([what, *told]) if gyr is not None else f"{what} are taken"
 
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
-        """The form, if most lines begin with one of several words."""
+        """The form, if most lines begin with one of several words.
+
+        Raises
+        ------
+        InputError
+            If the lines of both sensors have no times in common.
+
+        """
         seen = Counter(find_separator(line) for line in lines)
         parted = separator or (seen.most_common(1)[0][0] if seen else None)
         rows = [split_cells(line, parted) for line in lines]
@@ -115,7 +130,14 @@ class TaggedLines(TextForm):
             or _are_apart(rows, place, (acc, gyr), time)
         ):
             return None
-        return cls(parted, place, acc, gyr, time)
+        ratio = 1.0
+        if gyr is not None and time >= 0:
+            t, late = (_times(rows, place, kind, time) for kind in (acc, gyr))
+            known = clock_ratio(t, late, part=True)
+            if known is None:
+                raise InputError(say_apart(t, late, acc.word, gyr.word))
+            ratio = known
+        return cls(parted, place, acc, gyr, time, ratio)
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -146,8 +168,10 @@ class TaggedLines(TextForm):
                     continue
                 if (t := time(word, row)) is None:
                     continue
-                rates = self._of_gyroscope(row) if own else []
-                found += pairs.rate(t, rates) if own else pairs.force(t, row)
+                if own:
+                    found += pairs.rate(t * self._ratio, self._of_gyroscope(row))
+                else:
+                    found += pairs.force(t, row)
             return [(self._separator or " ").join(row) for row in found]
 
         return read
@@ -203,6 +227,14 @@ def _are_apart(
     blank = [{i for i in range(kinds[0].width) if i != time} - one for one in filled]
     own = (filled[0] & blank[1], filled[1] & blank[0])
     return min(map(len, own)) >= len("xyz")
+
+
+def _times(
+    rows: Sequence[Sequence[str]], place: int, kind: LineKind, time: int
+) -> Array:
+    """Times (n,) of lines of a kind."""
+    own = (r[time] for r in rows if len(r) == kind.width and r[place] == kind.word)
+    return np.array([float(cell) for cell in own if is_number(cell, False)])
 
 
 def _is_word(rows: Sequence[Sequence[str]], i: int) -> bool:

@@ -32,11 +32,11 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
     )
     add("--separator", help="between columns (default: detected)")
     add("--skip", type=int, metavar="N", help="lines at the top (default: detected)")
-    add("--acc-unit", default="", help="m/s^2, mm/s^2, cm/s^2, g, mg, ug, V, count")
+    add("--acc-unit", default="", help="m/s^2, mm/s^2, cm/s^2, ft/s^2, in/s^2, g, mg, ug, V, count")
     add(
         "--gyr-unit",
         default="",
-        help="rad/s, mrad/s, deg/s, mdeg/s, udeg/s, deg/h, V, count",
+        help="rad/s, mrad/s, urad/s, deg/s, mdeg/s, udeg/s, deg/h, rev/s, rpm, V, count",
     )
     add(
         "--time-unit",
@@ -53,7 +53,7 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
         help="numbers of the file at no acceleration, such as 32768,32768,32768;"
         " one for all three axes if they are alike",
     )
-    add("--temp-unit", default="", help="degC, cdegC, mdegC, K, degF, count, none")
+    add("--temp-unit", default="", help="degC, ddegC, cdegC, mdegC, K, degF, count, none")
     add("--temp-lsb", type=float, default=1.0, metavar="N", help="counts in 1 K")
     add("--temp-zero", type=float, default=0.0, metavar="C", help="deg C at count 0")
 

@@ -17,17 +17,30 @@ TEMP_UNITS = {
     "degC": (1.0, 0.0),
     "cdegC": (0.01, 0.0),
     "mdegC": (0.001, 0.0),
+    "ddegC": (0.1, 0.0),
     "K": (1.0, -273.15),
     "degF": (5 / 9, -160 / 9),
     "none": (np.nan, np.nan),
 }
 """Kelvin in one of each, and deg C at its 0; "none" leaves it out."""
 
-FORCE_UNITS = ACC_UNITS | {"ug": 1e-6 * G0, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
+FOOT_M = 0.3048
+"""The international foot, of which an inch is a twelfth."""
+
+FORCE_UNITS = ACC_UNITS | {
+    "ug": 1e-6 * G0,
+    "mm/s^2": 1e-3,
+    "cm/s^2": 1e-2,
+    "ft/s^2": FOOT_M,
+    "in/s^2": FOOT_M / 12,
+}
 RATE_UNITS = GYR_UNITS | {
     "mdeg/s": 1e-3 * GYR_UNITS["deg/s"],
     "udeg/s": 1e-6 * GYR_UNITS["deg/s"],
     "deg/h": GYR_UNITS["deg/s"] / 3600,
+    "urad/s": 1e-6,
+    "rev/s": 2 * np.pi,
+    "rpm": 2 * np.pi / 60,
 }
 """SI units (or counts, volts) in one of each that a file may be in."""
 

@@ -98,7 +98,12 @@ def with_points(text: str) -> str:
 
 
 def is_number(cell: str, comma: bool) -> bool:
-    """Whether a cell is a number, where a comma is a decimal comma or no part of it."""
+    """Whether a cell is a number, where a comma is a decimal comma or no part of it.
+
+    Python reads 1_000 as one, which of files is a word: ``260314_101530``.
+    """
+    if "_" in cell:
+        return False
     try:
         float(with_points(cell) if comma else cell)
     except ValueError:

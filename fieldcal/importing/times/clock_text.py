@@ -11,7 +11,7 @@ only where the date changes: the reading that lies nearest to the date before is
 from __future__ import annotations
 
 import re
-from datetime import date
+from datetime import date, timedelta
 
 _DATE = (
     r"(?P<date>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}"
@@ -22,7 +22,7 @@ _TIME = (
     r"(?:\s*(?P<half>[AaPp][Mm]))?"
 )
 _ZONE = r"(?:\s*(?P<zone>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?))?"
-_CLOCK = re.compile(rf"(?:(?:{_DATE}|(?P<days>\d+) days?)[T ,;\t]\s*)?{_TIME}{_ZONE}")
+_CLOCK = re.compile(rf"(?:(?:{_DATE}|(?P<days>\d+) days?)[T ,;\t_-]\s*)?{_TIME}{_ZONE}")
 _LATE_YEAR = re.compile(
     r"(?:[A-Z][a-z]{2} )?(?P<month>[A-Z][a-z]{2})\s+(?P<day>\d{1,2})"
     r" (?P<time>[\d:.]+) (?P<year>\d{4})"
@@ -30,13 +30,30 @@ _LATE_YEAR = re.compile(
 """What C calls ``ctime``: ``Wed Dec 22 21:09:46 2021``."""
 
 _DIGITS = r"(0[1-9]|1[0-2])([0-2]\d|3[01]){}([01]\d|2[0-3])([0-5]\d)([0-5]\d|60)"
-_BASIC = re.compile(rf"(\d{{4}}){_DIGITS.format('T')}([.,]\d+)?(\D.*)?")
+_BASIC = re.compile(rf"(\d{{4}}){_DIGITS.format('[T _-]')}([.,]\d+)?(\D.*)?")
 """Basic format of ISO 8601, which leaves the signs out: ``20260314T101530.250Z``."""
+
+_SHORT_YEAR = re.compile(
+    r"(\d\d)(\d\d)(\d\d)[T _-]([01]\d|2[0-3])([0-5]\d)([0-5]\d|60)([.,]\d+)?"
+)
+"""The same with two digits of the year, before or behind: ``260314_101530.25``."""
+
+_ORDINAL = re.compile(r"(\d{4})[-:/](\d{3})[T :_](\d\d:\d\d:\d\d\S*)")
+_DAY_OF_YEAR = re.compile(r"(\d{3}):(\d\d:\d\d:\d\d(?:[.,]\d+)?)")
+"""The day of the year, as ISO 8601 writes it, ``2026-073T10:15:30``, and alone, as the
+code of IRIG does: ``073:10:15:30.25``."""
+
+_SIGNS = re.compile(
+    r"(\d{4})年(\d{1,2})月(\d{1,2})日\s*(\d{1,2})[时時:](\d\d)[分:](\d\d(?:[.,:]\d+)?)秒?"
+)
+"""Signs of Chinese and Japanese: ``2026年03月14日 10:15:30.25``."""
 
 _PLAIN = re.compile(rf"(20\d\d){_DIGITS.format('')}([.,]\d+|\d{{3}}|\d{{6}})?()")
 """The same without the T, ``20260314101530250``: no count has such figures in all."""
 
-_DASHED = re.compile(rf"{_DATE}[T _-](\d\d)([-.])(\d\d)\3(\d\d(?:[.,]\d+)?)(\D.*)?")
+_DASHED = re.compile(
+    rf"{_DATE}[T _-](\d\d)([-.])(\d\d)\3(\d\d)(?:(?:[.,]|\3)(\d+))?(\D.*)?"
+)
 """Signs as names of files have them: ``2026-03-14_10-15-30.250``."""
 
 _MINUTES = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d{2}[.,]\d+)")
@@ -51,6 +68,9 @@ IN_LINE = re.compile(rf"{_DATE}[T ]\s*{_TIME}{_ZONE_BEFORE_NUMBERS}(?=\s|$)")
 
 _MONTHS = "jan feb mar apr may jun jul aug sep oct nov dec".split()
 DAY, HOUR = 86400.0, 3600.0
+
+AT_ONCE_S = 10.0
+"""Between the last row before a clock goes back and the first one behind, s."""
 
 
 def is_clock(cell: str) -> bool:
@@ -76,8 +96,24 @@ def _usual_form(text: str) -> str:
         part = f".{part.lstrip('.,')}" if part else ""
         return f"{year}-{month}-{day}T{hour}:{minute}:{second}{part}{zone}"
     if (dashed := _DASHED.fullmatch(text)) is not None:
-        day, hour, _, minute, second, zone = dashed.groups("")
-        return f"{day}T{hour}:{minute}:{second}{zone}"
+        day, hour, _, minute, second, part, zone = dashed.groups("")
+        return f"{day}T{hour}:{minute}:{second}{'.' if part else ''}{part}{zone}"
+    if (short := _SHORT_YEAR.fullmatch(text)) is not None:
+        one, two, three, hour, minute, second, part = short.groups("")
+        year_first = _possible_dates(f"20{one}-{two}-{three}")
+        day = f"20{one}-{two}-{three}" if year_first else f"{one}-{two}-20{three}"
+        # of 999999 a day there is none: a number
+        known = year_first or _possible_dates(day)
+        return f"{day}T{hour}:{minute}:{second}{part}" if known else text
+    if (ordinal := _ORDINAL.fullmatch(text)) is not None:
+        year, number, rest = ordinal.groups()
+        first = date(max(int(year), 1), 1, 1)
+        return f"{first + timedelta(days=int(number) - 1)}T{rest}"
+    if (numbered := _DAY_OF_YEAR.fullmatch(text)) is not None:
+        return f"{numbered[1]} days {numbered[2]}"
+    if (signs := _SIGNS.fullmatch(text)) is not None:
+        year, month, day, hour, minute, second = signs.groups()
+        return f"{year}-{month}-{day}T{hour}:{minute}:{second}"
     said = _LATE_YEAR.fullmatch(text)
     if said is None:
         return text
@@ -112,6 +148,7 @@ class ClockText:
         self._days: dict[str, int] = {}
         self._first: int | None = None
         self._day, self._last = 0, 0.0
+        self._newest, self._later, self._half_days = float("nan"), 0.0, False
         self._zone: float | None = None
 
     def seconds(self, text: str, day: str = "") -> float | None:
@@ -134,8 +171,27 @@ class ClockText:
         if said["days"]:
             return DAY * int(said["days"]) + since
         if written := said["date"] or day.strip():
-            return DAY * self._number(written) + since
-        return self._unwrapped(since, DAY)
+            since += DAY * self._number(written)
+        else:
+            since = self._unwrapped(since, DAY)
+        stated = bool(half or said["zone"])
+        return since if stated else self._forward(since)
+
+    def _forward(self, since: float) -> float:
+        """A time by a clock that goes back by half a day, or an hour in autumn.
+
+        Of 12 hours without AM and PM: 1:00 comes behind 12:59. Where summer ends, the
+        clock of the place goes back by an hour when an hour is full.
+        """
+        back = self._newest - (since + self._later)
+        hour = abs(since % HOUR - HOUR / 2) > HOUR / 2 - AT_ONCE_S
+        if self._half_days or abs(back - DAY / 2) <= AT_ONCE_S:
+            self._half_days = True
+            self._later += DAY / 2 * round(back / (DAY / 2))
+        elif hour and abs(back - HOUR) <= AT_ONCE_S:
+            self._later += HOUR
+        self._newest = since + self._later
+        return self._newest
 
     def _set_forward(self, zone: str | None) -> float:
         """By how much a clock is set forward since the first time, s: in summer."""

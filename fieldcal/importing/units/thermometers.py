@@ -10,6 +10,13 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 
+USUAL = (5.0, 60.0)
+"""Temperatures of a sensor at work, deg C: of counts, other ones may be anything."""
+
+WHOLE = {"ddegC": 10.0, "mdegC": 1000.0}
+"""Parts of a degree that only whole numbers count, and how many are in one."""
+
+
 def temperature_fits(values: Array) -> Mapping[str, float]:
     """Readings of temperatures (n,), with the median of each in deg C."""
     values = values[np.isfinite(values)]
@@ -23,11 +30,13 @@ def temperature_fits(values: Array) -> Mapping[str, float]:
         found["cdegC"] = middle / 100
     if 213 <= low and high <= 423:
         found["K"] = middle - 273.15
+    whole = bool((values == np.round(values)).all())
+    for unit, many in WHOLE.items():
+        if whole and USUAL[0] * many <= low and high <= USUAL[1] * many:
+            found[unit] = middle / many
     return found
 
 
-USUAL = (5.0, 60.0)
-"""Temperatures of a sensor at work, deg C: of counts, other ones may be anything."""
 
 
 def is_usual_temperature(celsius: float) -> bool:
@@ -37,6 +46,15 @@ def is_usual_temperature(celsius: float) -> bool:
     (True, False)
     """
     return USUAL[0] <= celsius <= USUAL[1]
+
+
+def may_be_fahrenheit(low: float, high: float) -> bool:
+    """Whether temperatures, hot for deg C, are those of a room in deg F.
+
+    >>> may_be_fahrenheit(68.4, 77.0), may_be_fahrenheit(25.0, 70.0)
+    (True, False)
+    """
+    return USUAL[1] < low and is_usual_temperature((high - 32) * 5 / 9)
 
 
 class ThermometerScale(NamedTuple):

@@ -33,6 +33,9 @@ SLOWEST_HZ = 1e-3
 """Slowest rate of what anyone calls a recording, Hz: a reading in a quarter of an
 hour."""
 
+BRIEF_HZ = 1000.0
+"""Rate beyond which a log of less than `MIN_RECORDING_S` may be one in min."""
+
 MIN_RECORDING_S = 5.0
 """Shortest recording, s, where another unit of time makes it longer."""
 
@@ -106,6 +109,8 @@ def assumed_time_unit(
         _refuse_impossible_times(name, t, step)
         _ask_about_fast_times(name, step)
     if not fits or fits == ["s"]:
+        if step and 1 / step > BRIEF_HZ and _span(t) < MIN_RECORDING_S:
+            _ask_about_brief_times(name, step, _span(t))
         return "", ""
     rate = 1 / (TIME_UNITS[fits[0]] * step) if step else np.nan
     return fits[0], f"{fits[0]}, which makes {rate:.4g} Hz"
@@ -179,6 +184,29 @@ def _ask_about_fast_times(name: str, step: float) -> None:
         f" them. Add {' or '.join(['--time-unit s', *longer])}, as it is, or skip the"
         " column with _ and give --rate"
     )
+
+
+def _ask_about_brief_times(name: str, step: float, span: float) -> None:
+    """Ask about times, a `step` in s apart, of fast rows that end at once.
+
+    Raises
+    ------
+    InputError
+        With the rates in s and in min.
+
+    """
+    rate = rounded_text(1 / (TIME_UNITS["min"] * step))
+    raise InputError(
+        f"{name}: column t: its times make {rounded_text(1 / step)} Hz for"
+        f" {rounded_text(span)} s in s, and {rate} Hz in min: add --time-unit s or"
+        " --time-unit min"
+    )
+
+
+def _span(t: Array) -> float:
+    """What lies between the first and the last of times (n,)."""
+    known = t[np.isfinite(t)]
+    return float(known.max() - known.min()) if len(known) else 0.0
 
 
 def counts_from_long_ago(t: Array) -> bool:

@@ -41,6 +41,7 @@ from fieldcal.importing.units.scales import (
 from fieldcal.importing.units.thermometers import (
     ANALOG_THERMOMETERS,
     is_usual_temperature,
+    may_be_fahrenheit,
     temperature_counts,
     temperature_fits,
 )
@@ -324,9 +325,17 @@ class UnitGuess:
         known = values[np.isfinite(values)]
         whole = bool(len(known) and (known == np.round(known)).all())
         analog = whole and self.said.acc_lsb in {acc for acc, _ in ANALOG}
-        if "degC" in fits and not analog:
+        if not len(known):
             return
-        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+        low, high = float(known.min()), float(known.max())
+        if "degC" in fits and not analog:
+            if may_be_fahrenheit(low, high):
+                self._ask(
+                    f"its temperature reads {low:.6g} to {high:.6g}, which is hot in"
+                    " deg C and usual in deg F",
+                    ["--temp-unit degF", "--temp-unit degC, if it is so"],
+                )
+            return
         if analog:
             self._ask(
                 f"its temperature reads {low:.6g} to {high:.6g} beside counts of"

@@ -13,6 +13,8 @@ SPELLINGS = {
               "meters/sec2", "meters/sec^2", "meters/s^2"),
     "mm/s^2": ("mm/s^2", "mm/s2", "mm/s²", "mmps2"),
     "cm/s^2": ("cm/s^2", "cm/s2", "cm/s²", "gal"),
+    "ft/s^2": ("ft/s^2", "ft/s2", "ft/s²", "ft/s/s", "ft/sec^2", "ft/sec2", "fps2"),
+    "in/s^2": ("in/s^2", "in/s2", "in/s²", "in/s/s", "in/sec^2", "in/sec2", "ips2"),
     "mg": ("mg", "mgₙ", "milli g", "millig"),
     "ug": ("ug", "µg", "μg", "microg", "micro g"),
     "g": ("g", "g's", "gs", "g-force", "gforce", "g0", "gn", "gₙ"),
@@ -23,6 +25,9 @@ SPELLINGS = {
     "udeg/s": ("udeg/s", "udps", "µdps", "μdps"),
     "deg/h": ("deg/h", "°/h", "deg/hr", "°/hr", "dph", "deg/hour"),
     "mrad/s": ("mrad/s", "mradps"),
+    "urad/s": ("urad/s", "µrad/s", "μrad/s"),
+    "rev/s": ("rev/s", "r/s", "revs/s", "rev/sec", "revolutions/s"),
+    "rpm": ("rpm", "r/min", "rev/min", "revs/min"),
     "rad/s": ("rad/s", "radps", "rad s-1", "rad/sec", "rps", "rad s^-1", "rad.s-1",
               "rad.s^-1", "radians/s", "radian/s", "radians/sec", "radians/second",
               "rad/second"),
@@ -39,6 +44,8 @@ SPELLINGS = {
               "degree celsius"),
     "cdeg C": ("cdegc", "c°c", "centi deg", "centi deg c", "centidegc", "centi degc",
                "centidegrees c", "centidegrees celsius"),
+    "ddeg C": ("ddegc", "d°c", "deci deg", "decidegc", "deci degc", "decidegrees c",
+               "decidegrees celsius", "0.1 degc", "0.1degc", "0.1°c", "0.1 °c"),
     "mdeg C": ("mdegc", "m°c", "milli deg", "milli deg c", "millidegc", "milli degc",
                "milli °c", "millidegrees c", "millidegrees celsius",
                "milli degrees celsius"),
@@ -51,11 +58,12 @@ SPELLINGS = {
 CAPITALS = {"K": "K", "F": "deg F"}
 """Units only as capital letters: small ones count steps, or say what is filtered."""
 
-TEMPERATURES = {"deg C": "degC", "cdeg C": "cdegC", "mdeg C": "mdegC", "K": "K",
-                "deg F": "degF"}  # fmt: skip
+TEMPERATURES = {"deg C": "degC", "ddeg C": "ddegC", "cdeg C": "cdegC",
+                "mdeg C": "mdegC", "K": "K", "deg F": "degF"}  # fmt: skip
 """Units of temperatures, and what ``--temp-unit`` calls them."""
 
 THERMOMETERS = (*SPELLINGS["K"], *SPELLINGS["deg F"], *SPELLINGS["cdeg C"],
+                *SPELLINGS["ddeg C"],
                 *SPELLINGS["mdeg C"], "°c", "degc", "deg c", "celsius",
                 "℃", "degrees c", "deg.c", "ºc", "cel", "degrees celsius",
                 "deg celsius", "degree c", "degree celsius")  # fmt: skip
@@ -69,12 +77,16 @@ _UNIT_BEHIND = re.compile(r"(.*?)[\s_.]*([(\[][^()\[\]]*[)\]]|[^\s_.()\[\]]+)")
 
 _WRITTEN = {text: unit for unit, texts in SPELLINGS.items() for text in texts}
 
-TELLING = ("m/s^2", "mm/s^2", "rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "deg/h")
+OF_RATES = ("rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "deg/h", "urad/s", "rev/s",
+            "rpm")  # fmt: skip
+"""Units of rates."""
+
+TELLING = ("m/s^2", "mm/s^2", "ft/s^2", "in/s^2", *OF_RATES)
 """Units that tell the kind of a sensor, whatever its axes are called."""
 
 UNITS = {
-    "a": ("m/s^2", "mm/s^2", "cm/s^2", "g", "mg", "ug"),
-    "g": ("rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "deg/h"),
+    "a": ("m/s^2", "mm/s^2", "cm/s^2", "ft/s^2", "in/s^2", "g", "mg", "ug"),
+    "g": OF_RATES,
     "t": ("s", "ms", "us", "ns", "min", "h"),
     "dt": ("s", "ms", "us", "ns"),
     "temperature": tuple(TEMPERATURES),

@@ -8,6 +8,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Column, Heading
+from fieldcal.importing.tables.column_physics import is_direction
 from fieldcal.importing.times.gravity_sum import lacks_gravity
 from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.importing.words.sensor_words import AXES
@@ -33,7 +34,7 @@ def with_checked_forces(way: Heading, table: Array) -> Heading:
     table : (n, k) numbers of the first rows; nan where a cell is none
 
     """
-    way = _without_small_forces(way, table)
+    way = _without_small_forces(_with_gravity(way, table), table)
     acc, gravity = (_axes(way.columns, kind) for kind in "av")
     if not (acc and gravity) or table.shape[1] != len(way.columns):
         return way
@@ -46,6 +47,21 @@ def with_checked_forces(way: Heading, table: Array) -> Heading:
         return Heading(names, way.skip)
     for i in acc:
         names[i] = names[i]._replace(name=f"{USER} {names[i].name}")
+    return Heading(names, way.skip)
+
+
+def _with_gravity(way: Heading, table: Array) -> Heading:
+    """A heading in which gravity is called so, where ``gx gy gz`` are its parts.
+
+    No gyroscope has the same length in all rows; what is calculated has.
+    """
+    rates = _axes(way.columns, "g")
+    whole = bool(rates) and table.shape[1] == len(way.columns) and len(table) > 1
+    if not whole or not is_direction(table[:, rates]):
+        return way
+    names = [*way.columns]
+    for i, axis in zip(rates, AXES, strict=True):
+        names[i] = names[i]._replace(name=f"gravity {axis}")
     return Heading(names, way.skip)
 
 

@@ -100,10 +100,9 @@ def _usual_form(text: str) -> str:
         return f"{day}T{hour}:{minute}:{second}{'.' if part else ''}{part}{zone}"
     if (short := _SHORT_YEAR.fullmatch(text)) is not None:
         one, two, three, hour, minute, second, part = short.groups("")
-        year_first = _possible_dates(f"20{one}-{two}-{three}")
-        day = f"20{one}-{two}-{three}" if year_first else f"{one}-{two}-20{three}"
+        day = f"{one}-{two}-{three}"
         # of 999999 a day there is none: a number
-        known = year_first or _possible_dates(day)
+        known = _possible_dates(day)
         return f"{day}T{hour}:{minute}:{second}{part}" if known else text
     if (ordinal := _ORDINAL.fullmatch(text)) is not None:
         year, number, rest = ordinal.groups()
@@ -242,6 +241,8 @@ def _possible_dates(written: str) -> list[int]:
         tries = [(parts[0], parts[1], parts[2])]
     else:
         tries = [(parts[2], parts[0], parts[1]), (parts[2], parts[1], parts[0])]
+        if len(parts[2]) == len("24"):
+            tries.append((parts[0], parts[1], parts[2]))
     found = []
     for y, m, d in tries:
         try:

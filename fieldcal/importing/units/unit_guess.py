@@ -15,6 +15,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.units.calm_rates import HALVED, guess_unit_of_calm_rates
+from fieldcal.importing.units.changed_unit import changed_unit
 from fieldcal.importing.units.gravity_size import (
     GravityReading,
     are_means,
@@ -126,6 +127,7 @@ class UnitGuess:
         block = replace(block, t=t)
         self._zero = said.acc_scale * said.zero
         written, block = block.acc, replace(block, acc=block.acc - self._zero)
+        self._refuse_changes(block.acc / said.acc_scale)
         gravity = estimate_gravity(block.acc, of_rows, said.means)
         self._step = usual_step(t) if said.rate_hz is None else 1 / said.rate_hz
         if gravity and not said.acc_unit and said.acc_lsb == 1:
@@ -211,6 +213,17 @@ class UnitGuess:
         if (fits[0].unit, fits[0].lsb) != ("m/s^2", 1):
             self.found["acceleration"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, acc_unit=fits[0].unit, acc_lsb=fits[0].lsb)
+
+    def _refuse_changes(self, acc: Array) -> None:
+        """Refuse rows of which a part is in another unit."""
+        if (changed := changed_unit(acc)) is not None:
+            before, behind = (rounded_text(x) for x in changed[1:])
+            raise InputError(
+                f"{self._name}: |a| at rest is {before} up to row {changed.row} of its"
+                f" samples, and {behind} behind it, and gravity is the same everywhere:"
+                " its unit or its full scale changes there; make two files of it, and"
+                " import each"
+            )
 
     def _offset(self, gravity: GravityReading) -> None:
         if (np.abs(gravity.offset) > OFFSET * gravity.size).any():

@@ -126,7 +126,7 @@ class ArrayFile(ColumnRecording):
     def heading(self) -> list[Heading]:
         """Names of the columns of its arrays."""
         with self._opened() as tables:
-            return [Heading(columns_of(tables))]
+            return [Heading(self.named_by_file(columns_of(tables)))]
 
     def beginning(self) -> Array:
         """First rows of the columns of its longest arrays; of others nothing."""

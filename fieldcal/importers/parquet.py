@@ -115,7 +115,7 @@ class ParquetFile(ColumnRecording):
     def heading(self) -> list[Heading]:
         """Names of its columns, with their units."""
         with self._batches() as (schema, _):
-            return [Heading([_column(f) for f in schema])]
+            return [Heading(self.named_by_file([_column(f) for f in schema]))]
 
     def beginning(self) -> Array:
         """Numbers of its first batch; columns of other things are unknown."""

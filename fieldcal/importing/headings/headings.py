@@ -18,6 +18,7 @@ from fieldcal.importing.headings.filtered_axes import (
     without_filtered,
 )
 from fieldcal.importing.headings.heading import Column, HeadingMatch
+from fieldcal.importing.headings.low_words import without_low_words
 from fieldcal.importing.headings.numbered_axes import with_lettered_axes
 from fieldcal.importing.headings.repeated_names import with_distinct_names
 from fieldcal.importing.words.heading_units import HALF_ANGLE, UNITS
@@ -91,6 +92,7 @@ def match_headings(
         and (said := heading_meaning(column.name, column.unit)) is not None
         and (said.kind == "t" or not _is_no_sample(said))
     ]
+    named, low = without_low_words(named)
     named, filtered = without_filtered(named)
     named = best_columns(columns, named)
     acc, gyr = _triads(named, "a"), _triads(named, "g")
@@ -124,6 +126,9 @@ def match_headings(
         found[0] = replace(found[0], says=(*found[0].says, told))
     taken = [n for three in (*acc.values(), *gyr.values()) for n in three]
     told_of_filters = tell_filtered(columns, filtered, taken)
+    if low:
+        lower = f"{list_names(columns, low)}: lower halves of words; left out, so that"
+        told_of_filters.append(f"{lower} a step is one of 16 bits")
     found[0] = replace(found[0], says=(*found[0].says, *told_of_filters))
     if len(found) == 1:
         found = [replace(found[0], name="0")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any
@@ -14,8 +14,10 @@ from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.headings.heading import (
     NAMES,
+    Column,
     Heading,
 )
+from fieldcal.importing.headings.sensor_columns import of_sensor
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.recording import ImuStream, MeanScatter, Recording
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate
@@ -27,6 +29,7 @@ from fieldcal.importing.tables.scatter_columns import scatter_columns
 from fieldcal.importing.tables.table_speeds import speed_column, speed_unit
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
 from fieldcal.importing.times.row_validator import RowValidator
+from fieldcal.importing.words.file_names import SENSOR, sensor_of_file_name
 
 
 class ColumnRecording(Recording):
@@ -137,6 +140,17 @@ class ColumnRecording(Recording):
             self.says += [s for s in says if s not in self.says]
             self.mended += [s for s in mended if s not in self.mended]
         self.says.append(apart.sentence)
+
+    def named_by_file(self, columns: Sequence[Column]) -> list[Column]:
+        """Columns of which bare axes are those of the sensor the file is called by."""
+        stem = self.path.name.split(".")[0]
+        sensor = self.sensor or sensor_of_file_name(stem)
+        named = [of_sensor(sensor, one) for one in columns] if sensor else [*columns]
+        if named != [*columns] and not self.sensor:
+            said = f"its axes are those of the {SENSOR[sensor]}, as the file is called"
+            self.says += [said] if said not in self.says else []
+            self.told_by = "the names of its columns and of the file"
+        return named
 
     def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""

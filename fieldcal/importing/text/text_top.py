@@ -51,7 +51,7 @@ _DESCRIBED = re.compile(r"%\w+\(([^()]*)\)")
 """A column as loggers describe it by its type and name: ``%float(RawGyroX)``."""
 
 _RATE_WITHIN = re.compile(
-    r"(?:\bat|rate|frequency|freq|odr|fs)\b[\s:=_]*(?:is|of)?\s*([0-9]+(?:\.[0-9]+)?)\s*hz\b",
+    r"(?:\bat|rate|frequency|freq|odr|fs)\b[\s:=_,]*(?:is|of)?\s*([0-9]+(?:\.[0-9]+)?)\s*hz\b",
     re.IGNORECASE,
 )
 """A rate that stands among other words of a line."""
@@ -172,6 +172,8 @@ def count_top_lines(
         said = [row[j].strip() for j in use if j < len(row)]
         # a number alone, as of a rate, is no row
         bare = separator is None and len(row) > len(use) / 2
+        # "% Number of channels = 8" has one where a column is wanted
+        bare = bare and sum(is_number(c, True) for c in row) > NUMBERS * len(row)
         whole = bare or len(row) in (full, width)
         numbers = all(is_number(cell, separator != ",") for cell in said if cell)
         counted = _numbers_columns(split_cells(lines[i], separator))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 import zipfile
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +72,15 @@ def _phone(path: Path, block: Block) -> None:
             archive.writestr(name, text)
 
 
+def _sqlite(path: Path, block: Block) -> None:
+    with closing(sqlite3.connect(path)) as database, database:
+        names = ", ".join(f"{name} REAL" for name in COLUMNS)
+        database.execute(f"CREATE TABLE imu ({names})")
+        marks = ", ".join("?" * len(COLUMNS))
+        rows = table(block).tolist()
+        database.executemany(f"INSERT INTO imu VALUES ({marks})", rows)  # noqa: S608
+
+
 def _json(path: Path, block: Block) -> None:
     rows = [dict(zip(COLUMNS, row, strict=True)) for row in table(block).tolist()]
     path.write_text("\n".join(json.dumps(row) for row in rows) + "\n")
@@ -123,6 +134,7 @@ SMALL: dict[str, Callable[[Path, Block], object]] = {
     "arrays": _hdf5,
     "can_log": _candump,
     "json_log": _json,
+    "sqlite_log": _sqlite,
     "blackbox": lambda path, block: path.write_bytes(of_block(block)),
     "parquet": _parquet,
     "workbook": _workbook,
@@ -140,7 +152,8 @@ class Small:
         options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
         options = options if name == "can_log" else ""
         self.wanted = ReadOptions(COLUMNS, options=options)
-        if name in ("mcap", "rosbag", "phone_zip", "json_log", "blackbox"):
+        if name in ("mcap", "rosbag", "phone_zip", "json_log", "blackbox",
+                    "sqlite_log"):
             self.wanted = ReadOptions()
         self.content = path.read_bytes()
         self.expected = whole(path, self.wanted)

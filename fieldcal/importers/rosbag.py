@@ -29,6 +29,9 @@ WHAT = "ROS bags: .bag, .db3"
 
 BAG, SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
 
+TOPICS = b"CREATE TABLE topics"
+"""What the first page of a database of ROS 2 holds, and no other."""
+
 
 class Message(NamedTuple):
     """A message: its topic, time of logging, ns, and contents."""
@@ -40,7 +43,9 @@ class Message(NamedTuple):
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether a file begins like one."""
-    return head.startswith((BAG, SQLITE))
+    return head.startswith(BAG) or (
+        head.startswith(SQLITE) and TOPICS in head
+    )
 
 
 class RosBag(Recording):

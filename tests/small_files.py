@@ -86,6 +86,12 @@ def _json(path: Path, block: Block) -> None:
     path.write_text("\n".join(json.dumps(row) for row in rows) + "\n")
 
 
+def _markup(path: Path, block: Block) -> None:
+    rows = [" ".join(f'{name}="{x!r}"' for name, x in zip(COLUMNS, row, strict=True))
+            for row in table(block).tolist()]  # fmt: skip
+    path.write_text("<log>\n" + "\n".join(f"<s {row}/>" for row in rows) + "\n</log>\n")
+
+
 def _workbook(path: Path, block: Block) -> None:
     write_workbook(path, [COLUMNS, *table(block).tolist()])
 
@@ -135,6 +141,7 @@ SMALL: dict[str, Callable[[Path, Block], object]] = {
     "can_log": _candump,
     "json_log": _json,
     "sqlite_log": _sqlite,
+    "markup_log": _markup,
     "blackbox": lambda path, block: path.write_bytes(of_block(block)),
     "parquet": _parquet,
     "workbook": _workbook,
@@ -152,8 +159,15 @@ class Small:
         options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
         options = options if name == "can_log" else ""
         self.wanted = ReadOptions(COLUMNS, options=options)
-        if name in ("mcap", "rosbag", "phone_zip", "json_log", "blackbox",
-                    "sqlite_log"):
+        if name in (
+            "mcap",
+            "rosbag",
+            "phone_zip",
+            "json_log",
+            "blackbox",
+            "sqlite_log",
+            "markup_log",
+        ):
             self.wanted = ReadOptions()
         self.content = path.read_bytes()
         self.expected = whole(path, self.wanted)

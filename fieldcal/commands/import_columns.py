@@ -32,7 +32,11 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
     )
     add("--separator", help="between columns (default: detected)")
     add("--skip", type=int, metavar="N", help="lines at the top (default: detected)")
-    add("--acc-unit", default="", help="m/s^2, mm/s^2, cm/s^2, ft/s^2, in/s^2, g, mg, ug, V, count")
+    add(
+        "--acc-unit",
+        default="",
+        help="m/s^2, mm/s^2, cm/s^2, ft/s^2, in/s^2, g, mg, ug, V, count",
+    )
     add(
         "--gyr-unit",
         default="",
@@ -53,7 +57,11 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
         help="numbers of the file at no acceleration, such as 32768,32768,32768;"
         " one for all three axes if they are alike",
     )
-    add("--temp-unit", default="", help="degC, ddegC, cdegC, mdegC, K, degF, count, none")
+    add(
+        "--temp-unit",
+        default="",
+        help="degC, ddegC, cdegC, mdegC, K, degF, count, none",
+    )
     add("--temp-lsb", type=float, default=1.0, metavar="N", help="counts in 1 K")
     add("--temp-zero", type=float, default=0.0, metavar="C", help="deg C at count 0")
 

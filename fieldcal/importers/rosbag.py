@@ -43,9 +43,7 @@ class Message(NamedTuple):
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether a file begins like one."""
-    return head.startswith(BAG) or (
-        head.startswith(SQLITE) and TOPICS in head
-    )
+    return head.startswith(BAG) or (head.startswith(SQLITE) and TOPICS in head)
 
 
 class RosBag(Recording):

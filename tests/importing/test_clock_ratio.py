@@ -51,7 +51,8 @@ FORMS = [hdf5, records, tagged]
 
 @pytest.mark.parametrize("write", FORMS)
 @pytest.mark.parametrize(
-    ("t", "late"), [(MS, T + 0.002), (T, MS + 2), (T, (T + 0.002) * 1e9), (T, T + 0.002)]
+    ("t", "late"),
+    [(MS, T + 0.002), (T, MS + 2), (T, (T + 0.002) * 1e9), (T, T + 0.002)],
 )
 def test_times_in_another_unit_are_of_the_same_clock(
     write: Callable[[Path, Array, Array], None], t: Array, late: Array, tmp_path: Path

@@ -9,7 +9,6 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
-
 USUAL = (5.0, 60.0)
 """Temperatures of a sensor at work, deg C: of counts, other ones may be anything."""
 
@@ -35,8 +34,6 @@ def temperature_fits(values: Array) -> Mapping[str, float]:
         if whole and USUAL[0] * many <= low and high <= USUAL[1] * many:
             found[unit] = middle / many
     return found
-
-
 
 
 def is_usual_temperature(celsius: float) -> bool:

@@ -40,7 +40,8 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
     add(
         "--gyr-unit",
         default="",
-        help="rad/s, mrad/s, urad/s, deg/s, mdeg/s, udeg/s, deg/h, rev/s, rpm, V, count",
+        help="rad/s, mrad/s, urad/s, deg/s, mdeg/s, udeg/s, deg/h, rev/s, rpm, V,"
+        " count",
     )
     add(
         "--time-unit",

@@ -59,7 +59,7 @@ def page() -> str:
     )
     return (
         "<!DOCTYPE html><html><head><meta charset='utf-8'></head><body><p>Log of"
-        f" &lt;imu&gt;<br><table border=1 class=dataframe><thead><tr>{head}</tr></thead>"
+        f" &lt;imu&gt;<br><table border=1><thead><tr>{head}</tr></thead>"
         f"<tbody>{rows}</tbody></table></body></html>"
     )
 

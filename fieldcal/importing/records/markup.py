@@ -162,7 +162,7 @@ def read_markup(text: str) -> MarkupDocument:
 def _close(
     stack: list[Element], names: Collection[str], within: Collection[str] = ()
 ) -> None:
-    """End the innermost open element of some names, where none of `within` is nearer."""
+    """End the innermost open element of some names, if none of `within` is nearer."""
     for i in range(len(stack) - 1, 0, -1):
         low = stack[i].name.lower()
         if low in names:

@@ -6,6 +6,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
     Data,4,accelerometer_data,…,"0|10" messages of a FIT file
     RAW_IMU {time_usec : 5, xacc : 3}  messages of MAVLink as mavlogdump shows them
+    <UBX(ESF-MEAS, timeTag=5, …)>      messages of a u-blox receiver as pyubx2 prints them
     IMU:0.1,0.2,9.8,0,0,0              a word before the columns
     AcX,12,AcY,-45,AcZ,16384           values behind cells with their names
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
@@ -74,6 +75,7 @@ from fieldcal.importing.text.text_form import (
 )
 from fieldcal.importing.text.text_lines import split_quoted
 from fieldcal.importing.text.text_top import find_separator, split_cells
+from fieldcal.importing.text.ubx_lines import UbxLines
 from fieldcal.importing.text.vectornav_lines import VectorNavLines
 from fieldcal.importing.text.written_numbers import FortranNumbers, UnitCells
 from fieldcal.importing.text.zephyr_lines import ZephyrLines
@@ -262,7 +264,7 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, MavlinkText, FitCsv, LabviewText, ScaledCounts, RateOnTop,
+    DataflashText, MavlinkText, UbxLines, FitCsv, LabviewText, ScaledCounts, RateOnTop,
     ReceiverLines, VectorNavLines, ZephyrLines, SaulLines,
     CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
     QuotedCells, SpacedCells, PairedCells, FortranNumbers, UnitCells,

@@ -76,9 +76,11 @@ def write_hdf5(path: Path, device: Array, rows: Array) -> None:
 
 
 def write_npy(path: Path, device: Array, rows: Array) -> None:
-    table = np.rec.fromarrays([device, *rows.T], names=["node", *NAMES])
+    table = np.zeros(len(rows), [("node", "<i4"), *((name, "<f8") for name in NAMES)])
+    for name, column in zip(("node", *NAMES), (device, *rows.T), strict=True):
+        table[name] = column
     with path.open("wb") as file:
-        np.save(file, np.asarray(table))
+        np.save(file, table)
 
 
 def write_json(path: Path, device: Array, rows: Array) -> None:
@@ -139,6 +141,6 @@ def test_what_counts_parts_of_one_recording_divides_none(
     name: str, tmp_path: Path
 ) -> None:
     path, out = tmp_path / "log.csv", tmp_path / "out"
-    path.write_text(as_text(np.arange(len(ONE)) // 100, ONE, name))
+    path.write_text(as_text(np.arange(float(len(ONE))) // 100, ONE, name))
     assert main(["import", str(path), "-o", str(out)]) == 0
     np.testing.assert_allclose(Session.open(out).block.acc, ONE[:, 1:4], atol=1e-6)

@@ -30,7 +30,7 @@ SCALES = {16: 2.0**-10, 17: 2.0**-10, 18: 2.0**-10, 14: 2.0**-12, 13: 2.0**-12,
 FORCE, RATE, WARM = (16, 17, 18), (14, 13, 5), 12
 """Kinds of x y z of both sensors, and of the thermometer."""
 
-BITS = 24
+BITS, SPAN = 24, 1 << 24
 TICKS = {"MEAS": 1e-3, "RAW": 39.0625e-6}
 """Seconds in one of what the times of each message count."""
 
@@ -89,7 +89,7 @@ class UbxLines(TextForm):
             if self._message == "RAW":
                 wraps += ticks < newest - 2 ** (BITS - 1)
                 newest = ticks
-            return (ticks + 2**BITS * wraps) * TICKS[self._message]
+            return float(ticks + wraps * SPAN) * TICKS[self._message]
 
         def read(lines: Sequence[str]) -> list[str]:
             found = [] if lines else pairs.rest()

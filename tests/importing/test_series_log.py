@@ -65,9 +65,8 @@ def apart() -> str:
     for t, *row in ROWS.tolist():
         for i, (name, x) in enumerate(zip(AXES, row, strict=True)):
             sensor = "Acc" if name[0] == "a" else "Gyro"
-            found.append(
-                f"ns=2;s=IMU.{sensor}{name[1].upper()},{clock(t + i * 1e-4)},{x:.9g},Good"
-            )
+            node = f"ns=2;s=IMU.{sensor}{name[1].upper()}"
+            found.append(f"{node},{clock(t + i * 1e-4)},{x:.9g},Good")
     return "\n".join(found) + "\n"
 
 

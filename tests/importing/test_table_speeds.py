@@ -16,7 +16,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.tables.table_speeds import (
-    speed_column,
+    speed_columns,
     table_speeds,
     turned_rows,
 )
@@ -81,6 +81,32 @@ def test_the_rate_of_a_table_gives_the_scale_of_gyroscopes(
     np.testing.assert_allclose(gyro_scale(folder), SCALE, atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("names", "parts"),
+    [("cmd_x (deg/s),cmd_y (deg/s),cmd_z (deg/s)", 3),
+     ("inner_rate_dps,outer_rate_dps", 2), ("table x,table y,table z", 3)],
+)  # fmt: skip
+def test_the_rates_of_several_axes_are_one_rate(
+    tmp_path: Path, names: str, parts: int
+) -> None:
+    axes = np.repeat(np.array(AXES, float), 3, axis=0)
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    each = SPEED[:, None] * axes
+    if parts == 2:
+        # the outer axis lies across the inner one, wherever that stands
+        each = np.column_stack([np.hypot(each[:, 0], each[:, 1]), each[:, 2]])
+    head = f"{names},ax,ay,az,gx,gy,gz,{STD}"
+    path, folder = (
+        write(tmp_path, head, each, FORCE, RATE, more=SCATTER),
+        tmp_path / "o",
+    )
+    assert main(["import", str(path), "-o", str(folder), "--gyr-unit", "rad/s"]) == 0
+    positions = tomllib.loads((folder / "session.toml").read_text())["position"]
+    shown = [one.get("speed_deg_s", 0.0) for one in positions]
+    np.testing.assert_allclose(shown, np.abs(SPEED), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(gyro_scale(folder), SCALE, atol=1e-3)
+
+
 def test_rows_that_turn_at_no_known_rate_show_no_bias(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -132,7 +158,7 @@ def test_speeds_are_read_in_the_unit_in_which_the_device_turned(
 
 @given(st.text(max_size=20))
 def test_no_name_breaks_the_search_for_a_speed(name: str) -> None:
-    assert speed_column([Column("", name)]) in (None, 0)
+    assert speed_columns([Column("", name)]) in ([], [0])
 
 
 def test_a_bias_is_no_turn() -> None:

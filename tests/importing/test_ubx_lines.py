@@ -61,8 +61,8 @@ def raw() -> str:
     lines = []
     for i, tag in enumerate(ticks.tolist()):
         rates, forces = of_row(i)
-        lines += [f"12:00:00 <UBX(ESF-RAW, reserved0=0, {fields(rates + forces, tag)})>",
-                  REAL]  # fmt: skip
+        both = fields(rates + forces, tag)
+        lines += [f"12:00:00 <UBX(ESF-RAW, reserved0=0, {both})>", REAL]
     return "\n".join(lines) + "\n"
 
 

@@ -97,8 +97,11 @@ class SeriesColumns(NamedTuple):
         times = [i for i, cell in enumerate(head) if _is_time(cell)]
         if len(value) != 1 or not (named and times):
             return None
-        devices = [i for i, cell in enumerate(head)
-                   if tells_devices(cell) and not may_count(cell) and i not in named]  # fmt: skip
+        devices = [
+            i
+            for i, cell in enumerate(head)
+            if tells_devices(cell) and not may_count(cell)
+        ]
         unit = next((i for i, name in enumerate(bare) if name in UNITS), None)
         # "_start" and "_stop" are what a database was asked for
         time = min(times, key=lambda i: bare[i] not in ("time", "timestamp"))

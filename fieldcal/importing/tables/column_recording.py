@@ -26,7 +26,7 @@ from fieldcal.importing.tables.column_source import column_numbers, holds_means
 from fieldcal.importing.tables.means import row_scatter
 from fieldcal.importing.tables.own_times import OwnTimes, SensorsApart
 from fieldcal.importing.tables.scatter_columns import scatter_columns
-from fieldcal.importing.tables.table_speeds import speed_column, speed_unit
+from fieldcal.importing.tables.table_speeds import speed_columns, speed_unit
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.importing.words.file_names import SENSOR, sensor_of_file_name
@@ -163,11 +163,13 @@ class ColumnRecording(Recording):
         where = scatter_columns(named)
         means, values = (_columns_of(table, places) for places in (at, where))
         count = table[:, where["n"]] if "n" in where else None
-        timed, speed = columns.has_time(wanted.columns), speed_column(named)
-        if speed is None or speed in {i for c, i in at.items() if c != columns.SKIP}:
+        timed, speed = columns.has_time(wanted.columns), speed_columns(named)
+        if not speed or {*speed} & {i for c, i in at.items() if c != columns.SKIP}:
             return MeanScatter(means, values, count, timed)
-        unit = speed_unit(named[speed])
-        return MeanScatter(means, values, count, timed, table[:, speed], unit)
+        unit, said = speed_unit(named[speed[0]]), table[:, speed]
+        # the sign of the rate about a single axis is nobody's question
+        length = said[:, 0] if len(speed) == 1 else np.linalg.norm(said, axis=1)
+        return MeanScatter(means, values, count, timed, length, unit)
 
     def row_sigma(self, gravity: float) -> float | None:
         """Standard deviation of its rows, m/s^2, if each may be a position."""

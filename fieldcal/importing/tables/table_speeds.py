@@ -3,7 +3,8 @@
     rate (deg/s),gx_mean,gy_mean,gz_mean,gx_std,gy_std,gz_std
 
 The axis need not be known: whatever it is, the rates that the gyroscopes saw are as
-long as that of the table, which tells the unit of a column that says none.
+long as that of the table, which tells the unit of a column that says none. Of a table
+with several axes, a column for each, the rate is as long as the vector of them.
 """
 
 from __future__ import annotations
@@ -28,6 +29,12 @@ BESIDE = ("table", "turntable", "cmd", "command", "commanded", "set", "setpoint"
           "target", "nominal", "angular", "deg", "s", "dps", "rad")  # fmt: skip
 """Words that stand beside them and say no more."""
 
+COMMANDED = ("cmd", "command", "commanded", "setpoint", "table", "turntable")
+"""Words by which a rate of an axis is the table's without a word for a rate."""
+
+OF_AXES = ("x", "y", "z", "inner", "middle", "outer")
+"""What tells the axes of a table apart, which are perpendicular to each other."""
+
 UNITS = ("deg/s", "rad/s")
 
 OFF = 0.3
@@ -37,23 +44,51 @@ NO_BIAS = 0.5
 """Rate that no gyroscope has at rest, rad/s."""
 
 
-def speed_column(columns: Sequence[Column]) -> int | None:
-    """Column of the rate of a table; None if none is, or several are.
+def speed_columns(columns: Sequence[Column]) -> list[int]:
+    """Columns of the rate of a table, those of its axes if it has several.
+
+    Empty if no column is, or several are of the same axis.
 
     >>> names = ("rate (deg/s)", "gx_mean", "gyro rate x", "speed_dps")
-    >>> speed_column([Column("", name) for name in names[:3]])
-    0
-    >>> speed_column([Column("", name) for name in names]) is None
-    True
+    >>> speed_columns([Column("", name) for name in names[:3]])
+    [0]
+    >>> speed_columns([Column("", name) for name in names])
+    []
+    >>> speed_columns([Column("", f"cmd_{axis} (deg/s)") for axis in "xyz"])
+    [0, 1, 2]
+    >>> speed_columns([Column("", "inner_rate_dps"), Column("", "outer_rate_dps")])
+    [0, 1]
     """
     found = [i for i, column in enumerate(columns) if _is_speed(column)]
-    return found[0] if len(found) == 1 else None
+    if len(found) == 1:
+        return found
+    names = [{*words_in_name(column.name)} for column in columns]
+    of_axes = {
+        i: own.pop()
+        for i, words in enumerate(names)
+        if len(own := words & {*OF_AXES}) == 1 and _is_of_axis(columns[i])
+    }
+    rest = {frozenset(names[i] - {axis}) for i, axis in of_axes.items()}
+    units = {speed_unit(columns[i]) for i in of_axes}
+    distinct = len({*of_axes.values()}) == len(of_axes)
+    several = 1 < len(of_axes) <= len("xyz")
+    whole = several and distinct and len(rest) == len(units) == 1 and not found
+    return [*of_axes] if whole else []
 
 
 def _is_speed(column: Column) -> bool:
     words = {*words_in_name(column.name)}
     bare = words & {*SPEEDS} and words <= {*SPEEDS, *BESIDE}
     return bool(bare) and heading_meaning(column.name, column.unit) is None
+
+
+def _is_of_axis(column: Column) -> bool:
+    """Whether a column is the rate of one axis of a table, of no sensor."""
+    words = {*words_in_name(column.name)}
+    bare = words & {*SPEEDS, *COMMANDED} and words <= {*SPEEDS, *BESIDE, *OF_AXES}
+    said = heading_meaning(column.name, column.unit)
+    commanded = bool(words & {*COMMANDED})
+    return bool(bare) and (said is None or not said.kind or commanded)
 
 
 def speed_unit(column: Column) -> str:

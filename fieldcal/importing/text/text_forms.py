@@ -6,7 +6,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     Acc = V { Data = <0.1, 0.2, 9.8> }  values within brackets, of named records or none
     Data,4,accelerometer_data,…,"0|10" messages of a FIT file
     RAW_IMU {time_usec : 5, xacc : 3}  messages of MAVLink as mavlogdump shows them
-    <UBX(ESF-MEAS, timeTag=5, …)>      messages of a u-blox receiver as pyubx2 prints them
+    <UBX(ESF-MEAS, timeTag=5, …)>      messages of u-blox as pyubx2 prints them
     IMU:0.1,0.2,9.8,0,0,0              a word before the columns
     AcX,12,AcY,-45,AcZ,16384           values behind cells with their names
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each

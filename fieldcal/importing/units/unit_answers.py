@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NoReturn
+
 import numpy as np
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.units.gravity_size import GravityReading
@@ -63,3 +67,15 @@ def scales_of_decimals(fits: list[Scale], values: Array) -> list[Scale]:
     known = values[np.isfinite(values)]
     plain = [fit for fit in fits if fit.lsb == 1]
     return plain if plain and (known != np.round(known)).any() else fits
+
+
+def ask_unit(name: str, what: str, answers: Sequence[str]) -> NoReturn:
+    """Ask about a unit of a recording, with answers to paste.
+
+    Raises
+    ------
+    InputError
+        Always.
+
+    """
+    raise InputError(f"{name}: {what}: add {' or '.join(answers)}")

@@ -8,9 +8,10 @@ has several IMUs, what their names do not share tells them apart, and what one a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
+from fieldcal.importing.headings.axis_triads import rates_by_force, triads
 from fieldcal.importing.headings.best_columns import NamedColumn, best_columns
 from fieldcal.importing.headings.filtered_axes import (
     list_names,
@@ -21,14 +22,20 @@ from fieldcal.importing.headings.heading import Column, HeadingMatch
 from fieldcal.importing.headings.low_words import without_low_words
 from fieldcal.importing.headings.numbered_axes import with_lettered_axes
 from fieldcal.importing.headings.repeated_names import with_distinct_names
+from fieldcal.importing.headings.thermometer_columns import thermometer
+from fieldcal.importing.headings.time_columns import (
+    OTHER_CLOCK,
+    columns_of_imu,
+    nearest_before,
+    plainest,
+    stamps,
+)
 from fieldcal.importing.words.heading_units import HALF_ANGLE, UNITS
 from fieldcal.importing.words.heading_words import (
-    MEAN,
     REFERENCE,
     SCATTER,
     HeadingMeaning,
     bare_axis,
-    bare_label,
     heading_meaning,
     words_in_name,
 )
@@ -53,11 +60,6 @@ ROS = (("angular", "velocity"), ("linear", "acceleration"), ("ang", "vel"),
 
 CLOCK_PARTS = ("t_h", "t_min")
 """Kinds of columns that are added to the seconds of a clock."""
-
-OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "arrived",
-               "log", "receive", "received", "recv", "reception", "rx",
-               "recorded", "meta")  # fmt: skip
-"""Words of times that are another clock's than the device's."""
 
 ACCELERATION = ("acc", "beschl")
 """Beginnings of words that say acceleration, and no gain of velocity."""
@@ -95,7 +97,7 @@ def match_headings(
     named, low = without_low_words(named)
     named, filtered = without_filtered(named)
     named = best_columns(columns, named)
-    acc, gyr = _triads(named, "a"), _triads(named, "g")
+    acc, gyr = triads(named, "a"), triads(named, "g")
     if acc is None or gyr is None:
         return ()
     if not (acc or gyr):
@@ -104,21 +106,21 @@ def match_headings(
     lacking = all(one.says.weak for three in acc.values() for one in three)
     if not gyr and lacking and not weak:
         return ()
-    times = _stamps([n for n in named if n.says.kind == "t"])
+    times = stamps([n for n in named if n.says.kind == "t"])
     parts = [n for n in named if n.says.kind in CLOCK_PARTS]
     steps = [n for n in named if n.says.kind == "dt"][:1]
     apart = [n for n in named if n.says.kind == "l"]
-    rates = _rates_by_force(acc, gyr)
+    rates = rates_by_force(acc, gyr)
     found = []
     for label in acc or gyr:
         both = [*acc.get(label, ()), *(rates[label] if acc else gyr[label])]
         spans = [n for n in named if n.says.kind in GAIN_SPANS
                  and any(one.says.gain for one in both)]  # fmt: skip
-        warm, says = _thermometer(named, label)
-        rest = _plainest([n for n in named if n.says.kind == "seq"], ())
+        warm, says = thermometer(named, label)
+        rest = plainest([n for n in named if n.says.kind == "seq"], ())
         rest += [n for n in named if n.says.kind == "t_host"][:1]
-        clock = _plainest(_columns_of_imu(times, label) or times, OTHER_CLOCK)
-        clock = [_nearest_before(clock[0], times, both, columns)] if clock else steps
+        clock = plainest(columns_of_imu(times, label) or times, OTHER_CLOCK)
+        clock = [nearest_before(clock[0], times, both, columns)] if clock else steps
         chosen = [*clock, *parts, *both, *spans, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
     if left := [three for three in gyr.values() if acc and three not in rates.values()]:
@@ -139,10 +141,10 @@ def match_beside(columns: Sequence[Column], skip: str = "") -> HeadingMatch | No
     """Match times and the thermometer, where no name says an axis; None of others."""
     found = [(i, heading_meaning(c.name, c.unit)) for i, c in enumerate(columns)]
     named = [NamedColumn(i, said) for i, said in found if said is not None]
-    times = _stamps([n for n in named if n.says.kind == "t"])
+    times = stamps([n for n in named if n.says.kind == "t"])
     parts = [n for n in named if n.says.kind in CLOCK_PARTS]
-    warm, says = _thermometer(named, ())
-    chosen = [*_plainest(times, OTHER_CLOCK), *parts, *warm]
+    warm, says = thermometer(named, ())
+    chosen = [*plainest(times, OTHER_CLOCK), *parts, *warm]
     return _match(columns, chosen, skip, "0", says) if chosen else None
 
 
@@ -201,68 +203,9 @@ def _match_thermometer_file(
         return ()
     if any(n.says.axis for n in named) or any(map(bare_axis, unknown)):
         return ()
-    clock = _plainest(_stamps(times), OTHER_CLOCK)
-    _, says = _thermometer(chosen, ()) if others else ([], ())
+    clock = plainest(stamps(times), OTHER_CLOCK)
+    _, says = thermometer(chosen, ()) if others else ([], ())
     return (_match(columns, [*clock, *chosen], skip, "0", says),)
-
-
-def _triads(
-    named: Iterable[NamedColumn], kind: str
-) -> dict[tuple[str, ...], list[NamedColumn]] | None:
-    """Axes of a kind, by the words in which their names differ; None if ambiguous.
-
-    Axes that are not whole are none where others are; nor are those in several units.
-    """
-    groups: dict[tuple[str, ...], list[NamedColumn]] = {}
-    for one in named:
-        if one.says.kind == kind:
-            label = tuple(w for w in bare_label(one.says.label) if w not in MEAN)
-            groups.setdefault(label, []).append(one)
-    whole = {label: three for label, three in groups.items() if len(three) == len(AXES)}
-    if all(
-        len({n.says.axis for n in three}) == len(three) for three in groups.values()
-    ):
-        groups = whole or groups
-    for three in groups.values():
-        if sorted(one.says.axis for one in three) != [*AXES]:
-            return None
-        if len({one.says.unit for one in three}) > 1:
-            return None
-    return groups
-
-
-def _rates_by_force(
-    acc: Mapping[tuple[str, ...], list[NamedColumn]],
-    gyr: Mapping[tuple[str, ...], list[NamedColumn]],
-) -> dict[tuple[str, ...], list[NamedColumn]]:
-    """Gyroscopes of each IMU, by the label of its accelerometers.
-
-    Those with its label, the only ones, or those that share the most words with it.
-    """
-    found = {}
-    for label in acc:
-        shared = {own: len({*own} & {*label}) for own in gyr if own not in acc}
-        best = [own for own, many in shared.items() if many == max(shared.values())]
-        alike = len(best) == 1 and shared[best[0]]
-        only = next(iter(gyr)) if len(gyr) == 1 else best[0] if alike else label
-        found[label] = gyr.get(label) or gyr.get(only) or []
-    return found
-
-
-def _nearest_before(
-    clock: NamedColumn,
-    times: Sequence[NamedColumn],
-    axes: Sequence[NamedColumn],
-    columns: Sequence[Column],
-) -> NamedColumn:
-    """The time that stands next before the first axis, of those that are called alike.
-
-    Programs that write a time before each channel write one for each of their rates.
-    """
-    first = min(n.number for n in axes)
-    name = columns[clock.number].name
-    alike = [n for n in times if columns[n.number].name == name and n.number < first]
-    return max(alike, key=lambda n: n.number, default=clock)
 
 
 def _is_no_sample(said: HeadingMeaning) -> bool:
@@ -271,50 +214,6 @@ def _is_no_sample(said: HeadingMeaning) -> bool:
     quiet = {"noise"} if "low" in said.label else set()
     others = (*NOT_SAMPLES, *(ANGULAR if said.kind == "a" else ()))
     return bool(({*said.label} - quiet) & {*others})
-
-
-def _columns_of_imu(
-    named: Iterable[NamedColumn], label: tuple[str, ...]
-) -> list[NamedColumn]:
-    """Columns whose names have the label of one of several IMUs."""
-    return [n for n in named if label and set(label) <= set(n.says.label)]
-
-
-def _plainest(named: Sequence[NamedColumn], but: Sequence[str]) -> list[NamedColumn]:
-    """One of several columns: the shortest name, without `but` if possible."""
-    return sorted(
-        named, key=lambda n: (bool(set(n.says.label) & set(but)), len(n.says.label))
-    )[:1]
-
-
-def _stamps(times: Sequence[NamedColumn]) -> list[NamedColumn]:
-    """Times of measurement, without times of arrival if there are both."""
-    whole = [n for n in times if n.says.unit is None and "header" in n.says.label]
-    return whole or [*times]
-
-
-def _thermometer(
-    named: Iterable[NamedColumn], label: tuple[str, ...]
-) -> tuple[list[NamedColumn], tuple[str, ...]]:
-    """Return the thermometer nearest to an IMU, and a message about it.
-
-    Of those that only their unit tells, there must be one.
-    """
-    warm = [n for n in named if n.says.kind == "temperature"]
-    called = [n for n in warm if not n.says.weak]
-    near = [n for n in warm if not {*n.says.label} & {*FOREIGN}] or warm
-    warm = called or (near if len(near) == 1 else _columns_of_imu(warm, label))
-    near = _columns_of_imu(warm, label) or [
-        n for n in warm if not set(n.says.label) & set(FOREIGN)
-    ]
-    if near or not warm:
-        return _plainest(near, ()), ()
-    chosen = _plainest(warm, ())
-    other = " ".join(chosen[0].says.label)
-    return chosen, (
-        f"its only thermometer is that of the {other}: it is taken, but lies apart from"
-        " the IMU, so what goes with temperature may lag",
-    )
 
 
 def _match(

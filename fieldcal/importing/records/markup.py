@@ -19,6 +19,9 @@ ROWS = {"tr", "row", "table-row"}
 CELLS = {"td", "th", "cell", "table-cell"}
 """Elements of tables in HTML, and in the workbooks of two office programs as XML."""
 
+PARTS = {"thead", "tbody", "tfoot", "table-header-rows", "table-rows"}
+"""Parts of a table, whose rows are its."""
+
 EMPTY = {"area", "base", "br", "col", "embed", "hr", "img", "input", "link", "meta",
          "source", "track", "wbr"}  # fmt: skip
 """Elements of HTML that nothing ends."""
@@ -74,6 +77,8 @@ class Element:
             self.rows[0].append(_value("".join(one.inner)))
         elif low in ROWS and one.rows:
             self.rows.append(one.rows[0])
+        elif low in PARTS and one.rows:
+            self.rows += one.rows
         elif one.name not in self.fields:
             self.fields[one.name] = one.value
         elif isinstance(before := self.fields[one.name], Several):

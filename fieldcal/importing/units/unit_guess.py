@@ -16,6 +16,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.units.acceleration_guess import guess_acceleration
 from fieldcal.importing.units.changed_unit import changed_unit
+from fieldcal.importing.units.fixed_forces import forces_are_fixed
 from fieldcal.importing.units.gravity_size import (
     GravityReading,
     are_means,
@@ -31,6 +32,7 @@ from fieldcal.importing.units.time_units import (
     usual_step,
 )
 from fieldcal.importing.units.turned_axes import NamedColumns
+from fieldcal.importing.units.unit_answers import ask_unit
 from fieldcal.importing.units.unit_doubts import StatedUnits
 
 OFFSET = 0.25
@@ -104,6 +106,10 @@ class UnitGuess:
         if gravity:
             said_units = StatedUnits(name, self.said, self.found, columns)
             self.doubts += said_units.doubts(block, gravity)
+            guessed = not said.gyr_unit and said.gyr_lsb == 1
+            if not means and (guessed or "g" in said.named):
+                size = self.said.gyr_scale / said.gyr_scale
+                self._ask_of_fixed_forces(replace(block, gyr=block.gyr * size), gravity)
         if self.said.usual_acc and self.said.usual_acc == self.said.acc_unit:
             self.said = replace(self.said, cut=_are_whole(written / said.acc_scale))
         warm = None if said.temp_unit else block.temperature
@@ -134,6 +140,19 @@ class UnitGuess:
             self.said = replace(self.said, acc_unit=unit, acc_lsb=lsb)
         else:
             self.said = replace(self.said, gyr_unit=unit, gyr_lsb=lsb)
+
+    def _ask_of_fixed_forces(self, block: Block, gravity: GravityReading) -> None:
+        """Ask about accelerations that do not turn with the device."""
+        if forces_are_fixed(block.t, block.acc, block.gyr, gravity):
+            unit = self.said.gyr_unit or "rad/s"
+            ask_unit(
+                self._name,
+                "its accelerations stay as they are whatever turns its rates tell: a"
+                " filter seems to have turned them into the frame of the earth, or the"
+                " sensor is dead, and nothing can be calibrated by them; log those in"
+                " the axes of the sensor, or, if they are",
+                [f"--gyr-unit {unit}"],
+            )
 
     def _refuse_changes(self, acc: Array) -> None:
         """Refuse rows of which a part is in another unit."""

@@ -71,13 +71,59 @@ def test_an_accelerometer_may_be_alone(tmp_path: Path) -> None:
 
 def test_counts_are_taken_where_nothing_is_calibrated() -> None:
     t = ROWS[:EACH, 0]
-    counts = 32768 + np.round(ROWS[:EACH, 1:4] * 400)
-    lines = [*TOP, message("accelerometer_data", t, counts, "accel", "counts")]
+    raw = 32768 + np.round(ROWS[:EACH, 1:4] * 400)
+    lines = [*TOP, message("accelerometer_data", t, raw, "accel", "counts")]
     form = FitCsv.of(lines, None)
     assert form is not None
     assert form.names == ("time [s]", "accel_x", "accel_y", "accel_z")
     first = form.reader()(lines)[0].split(",")
-    assert [float(x) for x in first[1:]] == counts[0].tolist()
+    assert [float(x) for x in first[1:]] == raw[0].tolist()
+
+
+TURNS = {
+    "accel": ("0", "accel_cal_factor", 1, 4096, np.eye(3)[[1, 0, 2]] * [1, 1, -1]),
+    "gyro": ("1", "gyro_cal_factor", 5, 82, np.eye(3)[[2, 0, 1]] * [-1, 1, -1]),
+}
+OFFSETS = {"accel": [-12, 30, 5], "gyro": [-23, 19, -12]}
+
+
+def calibration(kind: str, one: int) -> str:
+    """A message with the calibration of a sensor, whose matrix has so many in one."""
+    number, name, factor, divisor, turn = TURNS[kind]
+    matrix = (turn * one).astype(int if one > 1 else float).ravel()
+    return ",".join([
+        "Data", "5", "three_d_sensor_calibration", cell("timestamp", [900], "s"),
+        cell(name, [factor], ""), cell("calibration_divisor", [divisor], "counts"),
+        cell("level_shift", [32768], ""), cell("offset_cal", OFFSETS[kind], ""),
+        cell("orientation_matrix", matrix, ""), cell("sensor_type", [number], ""),
+    ])  # fmt: skip
+
+
+def counts(kind: str, values: Array) -> Array:
+    """Counts (n, 3) of values (n, 3) in g or deg/s in the device's axes."""
+    _, _, factor, divisor, turn = TURNS[kind]
+    in_chip = values @ turn * divisor / factor
+    rounded: Array = np.round(in_chip + 32768 + OFFSETS[kind]).astype(int)
+    return rounded
+
+
+@pytest.mark.parametrize("one", [1, 65535])
+def test_counts_are_calibrated_as_messages_say(tmp_path: Path, one: int) -> None:
+    found = [*TOP, calibration("gyro", one), calibration("accel", one)]
+    for rows in np.split(ROWS, len(ROWS) // EACH):
+        for kind, values in (("accel", rows[:, 1:4] / G),
+                             ("gyro", np.rad2deg(rows[:, 4:]))):  # fmt: skip
+            name = "accelerometer_data" if kind == "accel" else "gyroscope_data"
+            found.append(message(name, rows[:, 0], counts(kind, values), kind,
+                                 "counts"))  # fmt: skip
+    path = tmp_path / "activity.csv"
+    path.write_text("\n".join(found) + "\n")
+    block, says = read_files([path])
+    np.testing.assert_allclose(block.acc, ROWS[:, 1:4], atol=0.51 * G / 4096)
+    np.testing.assert_allclose(
+        np.rad2deg(block.gyr), np.rad2deg(ROWS[:, 4:]), atol=0.51 * 5 / 82
+    )
+    assert any("calibrated as its own messages say" in said for said in says)
 
 
 @given(st.lists(st.text(alphabet='Data,4_accelerometer_data"|0.x-', max_size=60)))

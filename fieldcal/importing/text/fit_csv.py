@@ -6,8 +6,9 @@
 
 A message holds some samples, each at its offset from the time of the message. Each of
 the accelerometer goes with the nearest of the gyroscope. Calibrated values are taken
-where a message has them; else the counts, whose zero nobody says. Source: the fields of
-accelerometer_data and gyroscope_data in the profile of the FIT SDK.
+where a message has them; else the counts, calibrated as the last message before them
+says, or, where none does, as they are: then nobody says their zero. Source: the fields
+of accelerometer_data and gyroscope_data in the profile of the FIT SDK.
 """
 
 from __future__ import annotations
@@ -15,6 +16,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from fieldcal.importing.text.fit_calibration import (
+    MESSAGE,
+    FitCalibration,
+    calibrated_sensor,
+)
 from fieldcal.importing.text.nearest_lines import NearestLines
 from fieldcal.importing.text.text_form import Reader, TextForm
 from fieldcal.importing.text.text_lines import split_quoted
@@ -56,13 +62,21 @@ class FitCsv(TextForm):
 
     gathers = True
 
-    def __init__(self, calibrated: Mapping[str, bool]) -> None:
-        self._calibrated = calibrated
-        units = {
-            k: f" [{UNITS[k]}]" if known else "" for k, known in calibrated.items()
-        }
+    def __init__(
+        self,
+        calibrated: Mapping[str, bool],
+        calibrations: Mapping[str, FitCalibration],
+    ) -> None:
+        self._calibrated, self._first = calibrated, calibrations
+        units = {k: f" [{UNITS[k]}]" if known or k in calibrations else ""
+                 for k, known in calibrated.items()}  # fmt: skip
         self.names = ("time [s]", *(f"{kind}_{axis}{unit}"
                       for kind, unit in units.items() for axis in AXES))  # fmt: skip
+        if any(not known and k in calibrations for k, known in calibrated.items()):
+            self.says = (
+                "counts of its sensors are calibrated as its own messages say: what is"
+                " found remains of that calibration"
+            )
 
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> FitCsv | None:
@@ -72,14 +86,21 @@ class FitCsv(TextForm):
         read = [one for line in lines if (one := _samples(line)) is not None]
         calibrated = {one.kind: one.calibrated for one in read}
         kinds = [kind for kind in UNITS if kind in calibrated]
-        return cls({k: calibrated[k] for k in kinds}) if kinds else None
+        known: dict[str, FitCalibration] = {}
+        for line in lines:
+            if (found := _calibration(line)) is not None:
+                known.setdefault(*found)
+        return cls({k: calibrated[k] for k in kinds}, known) if kinds else None
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
         pairs = NearestLines(len(AXES))
+        known = dict(self._first)
 
         def rows(one: FitSamples) -> Iterator[list[str]]:
-            for t, values in zip(one.times, one.rows, strict=True):
+            calibration = None if one.calibrated else known.get(one.kind)
+            values_of = calibration.apply(one.rows) if calibration else one.rows
+            for t, values in zip(one.times, values_of, strict=True):
                 if len(self._calibrated) == 1:
                     yield [f"{t:.6f}", *values]
                 elif one.kind == "gyro":
@@ -90,6 +111,8 @@ class FitCsv(TextForm):
         def read(lines: Sequence[str]) -> list[str]:
             found = [] if lines else pairs.rest()
             for line in lines:
+                if (said := _calibration(line)) is not None and said[0] in known:
+                    known[said[0]] = said[1]
                 one = _samples(line)
                 if one is not None and self._calibrated.get(one.kind) == one.calibrated:
                     found += rows(one)
@@ -98,13 +121,28 @@ class FitCsv(TextForm):
         return read
 
 
+def _calibration(line: str) -> tuple[str, FitCalibration] | None:
+    """Sensor and calibration of a message; None of another line."""
+    if MESSAGE not in line:
+        return None
+    fields = _fields(split_quoted(line, ","))
+    found = FitCalibration.of(fields, WITHIN)
+    sensor = calibrated_sensor(fields)
+    return (sensor, found) if sensor and found is not None else None
+
+
+def _fields(cells: Sequence[str]) -> dict[str, str]:
+    """Values of the fields of a message, by their names."""
+    triples = zip(cells[3::3], cells[4::3], strict=False)
+    return {name: text.strip('"') for name, text in triples if name}
+
+
 def _samples(line: str) -> FitSamples | None:
     """Samples of a message; None of another line, or where cells differ in length."""
     cells = split_quoted(line, ",")
     if len(cells) <= len(AXES) or cells[0] != DATA or cells[2] not in MESSAGES:
         return None
-    triples = zip(cells[3::3], cells[4::3], strict=False)
-    fields = {name: text.strip('"') for name, text in triples if name}
+    fields = _fields(cells)
     kind = MESSAGES[cells[2]]
     began, more = (fields.get(name, "") for name in ("timestamp", "timestamp_ms"))
     calibrated = bool(fields.get(f"calibrated_{kind}_x"))

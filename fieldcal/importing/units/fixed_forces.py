@@ -1,4 +1,4 @@
-"""Accelerations that do not turn with the device: a filter turned them into the earth's.
+"""Accelerations that do not turn with the device: a filter turned them to the earth.
 
     a = (0, 0, g) in every row, whatever turns the gyroscopes tell
 

@@ -31,7 +31,7 @@ def units_over(columns: Sequence[Column], at: Mapping[str, int]) -> dict[str, st
     columns : in the order of the file
     at : number of each channel's column
 
-    >>> names = ("t (ms)", "fx (g)", "fy (g)", "fz (g)", "p (rpm)")
+    >>> names = ("t (ms)", "fx (g)", "fy (g)", "fz (g)", "p (V)")
     >>> at = {"t": 0, "ax": 1, "ay": 2, "az": 3, "gx": 4}
     >>> units_over([Column("", name) for name in names], at)
     {'a': 'g', 't': 'ms'}

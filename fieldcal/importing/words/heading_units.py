@@ -77,16 +77,15 @@ _UNIT_BEHIND = re.compile(r"(.*?)[\s_.]*([(\[][^()\[\]]*[)\]]|[^\s_.()\[\]]+)")
 
 _WRITTEN = {text: unit for unit, texts in SPELLINGS.items() for text in texts}
 
-OF_RATES = ("rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "deg/h", "urad/s", "rev/s",
-            "rpm")  # fmt: skip
-"""Units of rates."""
+OF_RATES = ("rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "deg/h", "urad/s")
+"""Units of rates of a device; in revolutions turn motors as well."""
 
 TELLING = ("m/s^2", "mm/s^2", "ft/s^2", "in/s^2", *OF_RATES)
 """Units that tell the kind of a sensor, whatever its axes are called."""
 
 UNITS = {
     "a": ("m/s^2", "mm/s^2", "cm/s^2", "ft/s^2", "in/s^2", "g", "mg", "ug"),
-    "g": OF_RATES,
+    "g": (*OF_RATES, "rev/s", "rpm"),
     "t": ("s", "ms", "us", "ns", "min", "h"),
     "dt": ("s", "ms", "us", "ns"),
     "temperature": tuple(TEMPERATURES),

@@ -92,6 +92,21 @@ def _markup(path: Path, block: Block) -> None:
     path.write_text("<log>\n" + "\n".join(f"<s {row}/>" for row in rows) + "\n</log>\n")
 
 
+def _series(path: Path, block: Block) -> None:
+    """One behind the other."""
+    lines = [f"{row[0]!r},{name},{row[i]!r}" for i, name in enumerate(COLUMNS) if i
+             for row in table(block).tolist()]  # fmt: skip
+    path.write_text("\n".join(["time,variable,value", *lines]) + "\n")
+
+
+def _octave(path: Path, block: Block) -> None:
+    parts = ["# Created by Octave 6.4.0, Mon Jan 05 12:00:00 2026 UTC <me@pc>"]
+    for name, column in zip(COLUMNS, table(block).T.tolist(), strict=True):
+        head = f"# name: {name}\n# type: matrix\n# rows: {len(column)}\n# columns: 1"
+        parts += [head, *(f" {x!r}" for x in column), "", ""]
+    path.write_text("\n".join(parts) + "\n")
+
+
 def _workbook(path: Path, block: Block) -> None:
     write_workbook(path, [COLUMNS, *table(block).tolist()])
 
@@ -142,11 +157,18 @@ SMALL: dict[str, Callable[[Path, Block], object]] = {
     "json_log": _json,
     "sqlite_log": _sqlite,
     "markup_log": _markup,
+    "series_log": _series,
+    "octave_text": _octave,
     "blackbox": lambda path, block: path.write_bytes(of_block(block)),
     "parquet": _parquet,
     "workbook": _workbook,
     "csv_like": lambda path, block: np.savetxt(path, table(block), delimiter=","),
 }
+
+
+OF_NAMES = ("mcap", "rosbag", "phone_zip", "json_log", "blackbox", "sqlite_log",
+            "markup_log", "series_log", "octave_text")  # fmt: skip
+"""Formats whose channels names tell."""
 
 
 class Small:
@@ -159,15 +181,7 @@ class Small:
         options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
         options = options if name == "can_log" else ""
         self.wanted = ReadOptions(COLUMNS, options=options)
-        if name in (
-            "mcap",
-            "rosbag",
-            "phone_zip",
-            "json_log",
-            "blackbox",
-            "sqlite_log",
-            "markup_log",
-        ):
+        if name in OF_NAMES:
             self.wanted = ReadOptions()
         self.content = path.read_bytes()
         self.expected = whole(path, self.wanted)

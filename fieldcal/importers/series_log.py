@@ -50,7 +50,8 @@ class SeriesLog(ArrayFile):
         """Values of each axis, and the times of each sensor."""
         if self._loaded is None:
             text = b"".join(as_utf8(self.pieces())).decode(errors="replace")
-            lines = _lines(text)
+            # a number that was cut off is another number
+            lines = _lines(text[: text.rfind("\n") + 1] if self.ends_early else text)
             columns = SeriesColumns.of(lines[:1000])
             with self.named_errors():
                 found = read_series(lines, columns) if columns else ({}, False)

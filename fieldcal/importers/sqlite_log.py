@@ -1,7 +1,8 @@
 """Tables of a database of SQLite, as programs on telephones and servers keep them.
 
 A table is a group with its name: ``accelerometer/timestamp``, ``accelerometer/x``. The
-numbers of its columns are arrays; texts that are times of a clock are seconds.
+numbers of its columns are arrays; texts that are times of a clock are seconds. Where a
+column of texts names devices or sensors, the rows of each are a group.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from fieldcal.importers.rosbag import SQLITE, TOPICS
 from fieldcal.importing.arrays.array_groups import arrays_in_group
 from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
 from fieldcal.importing.files.gzip_stream import unpacked_file
+from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
 from fieldcal.importing.words.device_names import tells_devices, tells_wearers
 
@@ -84,14 +86,30 @@ def _columns(database: sqlite3.Connection) -> Iterator[tuple[str, ArrayTable]]:
         cursor = database.execute(f'SELECT * FROM "{quoted}"')  # noqa: S608
         called = [column[0] for column in cursor.description]
         rows = cursor.fetchall()
-        for i, name in enumerate(called):
-            values = _numbers([row[i] for row in rows], name)
-            if values is not None:
-                yield (f"{table}/{name}" if names[1:] else name), table_of(values)
+        prefix = f"{table}/" if names[1:] else ""
+        for part, some in _parts(called, rows).items():
+            for i, name in enumerate(called):
+                values = _numbers([row[i] for row in some])
+                if values is not None:
+                    yield f"{prefix}{part}{name}", table_of(values)
 
 
-def _numbers(cells: Sequence[Any], name: str) -> Array | None:
-    """Numbers (n,) of a column; None of other things. Names of devices are numbered."""
+def _parts(names: Sequence[str], rows: list[Any]) -> dict[str, list[Any]]:
+    """Rows of each device or sensor by its name, where a column of texts tells them."""
+    for tells in (tells_devices, tells_wearers):
+        for i, name in enumerate(names):
+            if not tells(name) or not all(isinstance(row[i], str) for row in rows):
+                continue
+            found: dict[str, list[Any]] = {}
+            for row in rows:
+                found.setdefault(f"{row[i].replace('/', ' ')}/", []).append(row)
+            if 1 < len(found) <= MAX_NAMED:
+                return {n: some for n, some in found.items() if len(some) >= MIN_ROWS}
+    return {"": rows}
+
+
+def _numbers(cells: Sequence[Any]) -> Array | None:
+    """Numbers (n,) of a column; None of other things."""
     known = [cell for cell in cells if cell is not None]
     if not known:
         return None
@@ -102,8 +120,6 @@ def _numbers(cells: Sequence[Any], name: str) -> Array | None:
         clock = ClockText()
         read = (clock.seconds(text) for text in texts)
         return np.array([np.nan if since is None else since for since in read])
-    if tells_devices(name) or tells_wearers(name):
-        return np.unique(texts, return_inverse=True)[1].astype(float)
     try:
         return np.array([float(text) if text else np.nan for text in texts])
     except ValueError:

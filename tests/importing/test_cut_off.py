@@ -19,8 +19,9 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.files.gzip_stream import unpacked_pieces
 from fieldcal.session.folder import Session
 
-NO_STREAM = ("arrays", "parquet", "phone_zip", "workbook")
-"""Formats that nothing can be read of without their end."""
+NO_STREAM = ("arrays", "parquet", "phone_zip", "workbook", "sqlite_log", "octave_text",
+             "series_log")  # fmt: skip
+"""Formats that nothing, or no whole sample, can be read of without their end."""
 
 
 def begins(found: Block, expected: Block) -> None:

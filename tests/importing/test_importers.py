@@ -458,7 +458,8 @@ def test_what_is_in_a_file_is_listed_and_chosen(
     ("content", "says"),
     [
         (b"", "is empty"),
-        (b"SQLite format 3\0" + bytes(100), "cannot be read"),
+        (b"SQLite format 3\0" + bytes(100), "is not whole"),
+        (b"SQLite format 3\0" + bytes(84) + b"CREATE TABLE topics", "cannot be read"),
         (bytes(range(256)) * 9, "--format"),
         (b"1,2,3\n", "say what its columns are"),
         (b"\x1f\x8b\x08\x00garbage", "behind byte 0, unpacked"),

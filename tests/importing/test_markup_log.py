@@ -38,6 +38,13 @@ def nested() -> str:
     return f"<i:log xmlns:i='urn:imu'><i:n>7</i:n>{each(form, '')}</i:log>"
 
 
+def named() -> str:
+    """With names in attributes, and lists of numbers."""
+    form = ('<row><p name="t" value="{0:.9g}"/><p name="acc">{1:.9g} {2:.9g}'
+            ' {3:.9g}</p><p name="gyr">{4:.9g}, {5:.9g}, {6:.9g}</p></row>')  # fmt: skip
+    return f"{DECLARED}<log>{each(form)}</log>"
+
+
 def track() -> str:
     """As devices write tracks with what else they measure."""
     points = [
@@ -83,7 +90,7 @@ def workbook() -> str:
 
 
 @pytest.mark.parametrize(
-    "written", [attributes, nested, track, page, loose_table, workbook]
+    "written", [attributes, nested, named, track, page, loose_table, workbook]
 )
 def test_its_samples_are_read(written: Callable[[], str], tmp_path: Path) -> None:
     path = tmp_path / "log"

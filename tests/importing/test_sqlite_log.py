@@ -72,10 +72,20 @@ def test_devices_in_one_table_and_times_as_text(tmp_path: Path) -> None:
     )
     out = tmp_path / "out"
     assert main(["import", str(path), "-o", str(out)]) == 0
-    for name, scale in (("0", 1.0), ("1", 1.02)):
+    for name, scale in (("left", 1.0), ("right", 1.02)):
         block = Session.open(out / name).block
         np.testing.assert_allclose(block.acc, A * scale, atol=1e-9)
         np.testing.assert_allclose(np.diff(block.t), 0.02, atol=1e-6)
+
+
+def test_rows_of_two_sensors_in_one_table_go_together(tmp_path: Path) -> None:
+    rows: list[tuple[object, ...]] = []
+    for t, a, w in zip(T.tolist(), A.tolist(), W.tolist(), strict=True):
+        rows += [("Accelerometer", t, *a), ("Gyroscope", t + 0.003, *w)]
+    made = "CREATE TABLE data (sensor TEXT, timestamp REAL, x REAL, y REAL, z REAL)"
+    block, _ = read_files([database(tmp_path / "log.db", (made, "data", rows))])
+    np.testing.assert_allclose(block.acc, A)
+    np.testing.assert_allclose(block.gyr, W)
 
 
 def test_a_packed_one_is_read_and_a_damaged_one_refused(tmp_path: Path) -> None:

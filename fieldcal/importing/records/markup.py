@@ -19,6 +19,9 @@ ROWS = {"tr", "row", "table-row"}
 CELLS = {"td", "th", "cell", "table-cell"}
 """Elements of tables in HTML, and in the workbooks of two office programs as XML."""
 
+NAMED, VALUES = {"name", "key", "id", "channel", "label"}, {"value", "val", ""}
+"""Attributes that name what an element holds, and where it stands; "" for its text."""
+
 PARTS = {"thead", "tbody", "tfoot", "table-header-rows", "table-rows"}
 """Parts of a table, whose rows are its."""
 
@@ -34,6 +37,9 @@ _PART = re.compile(
     r"|(?P<text>[^<]+)|<",
     re.DOTALL,
 )
+
+FEWEST = 3
+"""Numbers in an element that are several, as of axes."""
 
 DEEPEST = 60
 """Elements within elements that are looked at."""
@@ -79,6 +85,8 @@ class Element:
             self.rows.append(one.rows[0])
         elif low in PARTS and one.rows:
             self.rows += one.rows
+        elif (pair := one.named_value) is not None and pair[0] not in self.fields:
+            self.fields[pair[0]] = pair[1]
         elif one.name not in self.fields:
             self.fields[one.name] = one.value
         elif isinstance(before := self.fields[one.name], Several):
@@ -96,6 +104,19 @@ class Element:
             return _value(own)
         # what stands beside attributes is called as the element is
         return self.fields | ({"": _value(own)} if own else {})
+
+    @property
+    def named_value(self) -> tuple[str, Any] | None:
+        """A name and a value, where it says no more: ``<p name="ax" value="1"/>``."""
+        contents = self.value
+        if not isinstance(contents, dict) or len(contents) != len(("name", "value")):
+            return None
+        named = [key for key in contents if key.lower() in NAMED]
+        if len(named) != 1 or not isinstance(contents[named[0]], str):
+            return None
+        (other,) = contents.keys() - {*named}
+        is_value = other.lower() in VALUES
+        return (contents[named[0]], contents[other]) if is_value else None
 
     @property
     def holds_several(self) -> bool:
@@ -185,9 +206,22 @@ def _local(name: str) -> str:
 
 
 def _value(text: str) -> Any:
-    """A number, or the text."""
+    """A number, numbers between which spaces stand, or the text.
+
+    >>> _value(" 9.81 "), _value("0.1 0.2 9.8"), _value("0,1"), _value("at rest")
+    (9.81, [0.1, 0.2, 9.8], '0,1', 'at rest')
+    """
     bare = unescape(text).strip()
+    number = _number(bare)
+    parts = bare.replace(", ", " ").replace(";", " ").split()
+    if number is not None or len(parts) < FEWEST:
+        return bare if number is None else number
+    numbers = [_number(part) for part in parts]
+    return bare if None in numbers else numbers
+
+
+def _number(text: str) -> float | None:
     try:
-        return bare if "_" in bare or not bare else float(bare)
+        return None if "_" in text else float(text)
     except ValueError:
-        return bare
+        return None

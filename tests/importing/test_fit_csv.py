@@ -90,7 +90,7 @@ OFFSETS = {"accel": [-12, 30, 5], "gyro": [-23, 19, -12]}
 def calibration(kind: str, one: int) -> str:
     """A message with the calibration of a sensor, whose matrix has so many in one."""
     number, name, factor, divisor, turn = TURNS[kind]
-    matrix = (turn * one).astype(int if one > 1 else float).ravel()
+    matrix = (turn * one).astype(int if one > 1 else float).ravel().tolist()
     return ",".join([
         "Data", "5", "three_d_sensor_calibration", cell("timestamp", [900], "s"),
         cell(name, [factor], ""), cell("calibration_divisor", [divisor], "counts"),

@@ -41,7 +41,8 @@ def nested() -> str:
 def named() -> str:
     """With names in attributes, and lists of numbers."""
     form = ('<row><p name="t" value="{0:.9g}"/><p name="acc">{1:.9g} {2:.9g}'
-            ' {3:.9g}</p><p name="gyr">{4:.9g}, {5:.9g}, {6:.9g}</p></row>')  # fmt: skip
+            ' {3:.9g}</p><p name="gyr">{4:.9g}, {5:.9g}, {6:.9g}</p>')  # fmt: skip
+    form += "</row>"
     return f"{DECLARED}<log>{each(form)}</log>"
 
 

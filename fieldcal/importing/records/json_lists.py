@@ -26,6 +26,7 @@ from fieldcal.importing.records.json_record import (
 )
 from fieldcal.importing.records.pandas_json import records_of_frame
 from fieldcal.importing.records.record_pairs import pair_records
+from fieldcal.importing.records.sensor_numbers import with_named_sensors
 from fieldcal.importing.times.clock_text import ClockText
 from fieldcal.importing.times.fifo_time import GAP_BATCHES
 from fieldcal.importing.words.heading_words import heading_meaning
@@ -72,6 +73,7 @@ def json_lists(
     else:
         records = [read_record(one, order=order)
                    for one in document if isinstance(one, Mapping)]  # fmt: skip
+        records = [*with_named_sensors(records)]
         for bare, values in _fields(records, [] if says is None else says):
             yield (f"{name}/{bare}" if name else bare), values
 

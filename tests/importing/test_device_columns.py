@@ -136,6 +136,14 @@ def test_a_device_with_hardly_a_row_is_left_out_and_said(
     assert len(Session.open(out / "1").block) == len(OTHER)
 
 
+def test_a_few_rows_of_another_device_spoil_none(tmp_path: Path) -> None:
+    path, out = tmp_path / "log.csv", tmp_path / "out"
+    stray = as_text(np.full(5, 8.0), OTHER[:5]).split("\n", 1)[1]
+    path.write_text(as_text(np.full(len(ONE), 7.0), ONE) + stray)
+    assert main(["import", str(path), "-o", str(out)]) == 0
+    np.testing.assert_allclose(Session.open(out).block.acc, ONE[:, 1:4], atol=1e-6)
+
+
 @pytest.mark.parametrize("name", ["id", "position", "trial", "label"])
 def test_what_counts_parts_of_one_recording_divides_none(
     name: str, tmp_path: Path

@@ -112,7 +112,9 @@ class ImuInstances(NamedTuple):
     @property
     def are_several(self) -> bool:
         """Whether the cells name several devices, and not the sensors of one."""
-        return 1 < len(self.names) <= MAX_NAMED and not _are_sensors(self.names)
+        known = [*self.names, *self.silent, *self.few]
+        several = 1 < len(known) <= MAX_NAMED and bool(self.names)
+        return several and "" not in known and not _are_sensors(known)
 
     def _beside(self, row: Sequence[str]) -> Sequence[str]:
         """Cells behind the name; those before it where hardly any are behind."""

@@ -24,6 +24,7 @@ from fieldcal.importing.recording import ROWS, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
+from fieldcal.importing.times.one_device import NameChanges
 from fieldcal.importing.words.device_names import (
     may_count,
     tells_devices,
@@ -102,14 +103,20 @@ class ParquetFile(ColumnRecording):
                 for field in schema
                 if tells(field.name) and _may_name(field)
             ]
+            times = [one.name for one in schema if _is_time(one)][:1]
         for name in named:
-            with self._batches(only=name) as (_, batches):
-                many: Counter[str] = Counter()
+            many: Counter[str] = Counter()
+            changes, clock = NameChanges(), ClockText()
+            with self._batches(only=(name, *times)) as (_, batches):
                 for batch in batches:
-                    many.update(_texts(batch.column(name)).to_pylist())
-            many.pop(None, None)  # type: ignore[call-overload]
-            if 1 < len(many) <= MAX_NAMED:
-                return {n: (name, n) for n, rows in many.items() if rows >= MIN_ROWS}
+                    texts = _texts(batch.column(name)).to_pylist()
+                    many.update(texts)
+                    t = self._values(batch.column(times[0]), clock) if times else None
+                    if t is not None:
+                        changes.feed(np.array(texts), t)
+            known = {n: rows for n, rows in many.items() if n is not None}
+            if 1 < len(known) <= MAX_NAMED and not changes.go_on:
+                return {n: (name, n) for n, rows in known.items() if rows >= MIN_ROWS}
         return {}
 
     def heading(self) -> list[Heading]:
@@ -152,11 +159,11 @@ class ParquetFile(ColumnRecording):
 
     @contextmanager
     def _batches(
-        self, every: bool = False, only: str = ""
+        self, every: bool = False, only: Sequence[str] = ()
     ) -> Iterator[tuple[Any, Iterator[Any]]]:
         """Schema of its columns, and its batches, with the rows of one device.
 
-        Of `every` column, of `only` one, or of those wanted.
+        Of `every` column, of some `only`, or of those wanted.
         """
         with self._whole_batches(every, only) as (schema, batches):
             yield schema, map(self._rows_of_device, batches) if self.device else batches
@@ -172,7 +179,7 @@ class ParquetFile(ColumnRecording):
 
     @contextmanager
     def _whole_batches(
-        self, every: bool, only: str
+        self, every: bool, only: Sequence[str]
     ) -> Iterator[tuple[Any, Iterator[Any]]]:
         """Schema of its columns, and its batches, with the rows of all devices."""
         import pyarrow as pa
@@ -190,7 +197,7 @@ class ParquetFile(ColumnRecording):
                     schema = opened.schema_arrow
                     one: dict[str, Any] = {"use_threads": False}
                     if only:
-                        one["columns"] = [only]
+                        one["columns"] = [*only]
                     elif self.wanted.columns and not every:
                         one["columns"] = self._needed(schema.names)
                     yield flat_batches(schema, opened.iter_batches(ROWS, **one))
@@ -284,6 +291,13 @@ def _may_name(field: Any) -> bool:
     kind = kind.value_type if pa.types.is_dictionary(kind) else kind
     counts = bool(pa.types.is_integer(kind))
     return (counts and not may_count(field.name)) or _is_text(kind)
+
+
+def _is_time(field: Any) -> bool:
+    """Whether a column holds times, by its name or as they are stored."""
+    column = _column(field)
+    said = heading_meaning(column.name, column.unit)
+    return said is not None and said.kind == "t"
 
 
 def _texts(column: Any) -> Any:

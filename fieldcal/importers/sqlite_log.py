@@ -24,7 +24,9 @@ from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
 from fieldcal.importing.files.gzip_stream import unpacked_file
 from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
+from fieldcal.importing.times.one_device import NameChanges
 from fieldcal.importing.words.device_names import tells_devices, tells_wearers
+from fieldcal.importing.words.heading_words import heading_meaning
 
 WHAT = "databases of SQLite"
 
@@ -103,9 +105,23 @@ def _parts(names: Sequence[str], rows: list[Any]) -> dict[str, list[Any]]:
             found: dict[str, list[Any]] = {}
             for row in rows:
                 found.setdefault(f"{row[i].replace('/', ' ')}/", []).append(row)
-            if 1 < len(found) <= MAX_NAMED:
+            if 1 < len(found) <= MAX_NAMED and not _is_one(names, rows, i):
                 return {n: some for n, some in found.items() if len(some) >= MIN_ROWS}
     return {"": rows}
+
+
+def _is_one(names: Sequence[str], rows: Sequence[Any], i: int) -> bool:
+    """Whether the time in rows goes on wherever the text in a column changes."""
+    said = [heading_meaning(name) for name in names]
+    for at, one in enumerate(said):
+        if one is None or one.kind != "t":
+            continue
+        t = _numbers([row[at] for row in rows])
+        if t is not None:
+            changes = NameChanges()
+            changes.feed(np.array([row[i] for row in rows]), t)
+            return changes.go_on
+    return False
 
 
 def _numbers(cells: Sequence[Any]) -> Array | None:

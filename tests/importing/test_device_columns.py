@@ -144,6 +144,21 @@ def test_a_few_rows_of_another_device_spoil_none(tmp_path: Path) -> None:
     np.testing.assert_allclose(Session.open(out).block.acc, ONE[:, 1:4], atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "write",
+    [write_text, write_last, write_parquet, write_feather, write_hdf5, write_npy,
+     write_json],
+)  # fmt: skip
+def test_one_device_whose_time_goes_on_is_not_divided(
+    write: Callable[[Path, Array, Array], None], tmp_path: Path
+) -> None:
+    """As where the column of a module says what it did."""
+    path, out = tmp_path / "log", tmp_path / "out"
+    write(path, np.arange(len(ONE)) * 3 // len(ONE), ONE)
+    assert main(["import", str(path), "-o", str(out)]) == 0
+    np.testing.assert_allclose(Session.open(out).block.acc, ONE[:, 1:4], atol=1e-6)
+
+
 @pytest.mark.parametrize("name", ["id", "position", "trial", "label"])
 def test_what_counts_parts_of_one_recording_divides_none(
     name: str, tmp_path: Path

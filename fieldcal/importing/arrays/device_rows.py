@@ -14,12 +14,15 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.importing.arrays.array_tables import ArrayTable, columns_of
+from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
+from fieldcal.importing.times.one_device import NameChanges
 from fieldcal.importing.words.device_names import (
     may_count,
     tells_devices,
     tells_wearers,
 )
+from fieldcal.importing.words.heading_words import heading_meaning
 
 
 class DeviceRows(NamedTuple):
@@ -53,9 +56,25 @@ def device_rows(tables: Mapping[str, ArrayTable]) -> DeviceRows:
         for column in named:
             if tells(column.name) and not may_count(column.name):
                 values = _values(tables, column.place)
-                if found := _rows_by_number(values):
+                found = _rows_by_number(values)
+                if found and not _is_one(values, tables, named):
                     return DeviceRows(len(values), found)
     return DeviceRows(0, {})
+
+
+def _is_one(
+    values: Array, tables: Mapping[str, ArrayTable], named: Sequence[Column]
+) -> bool:
+    """Whether the time beside numbers (n,) goes on wherever these change."""
+    for column in named:
+        said = heading_meaning(column.name, column.unit)
+        if said is not None and said.kind == "t":
+            t = _values(tables, column.place)
+            if len(t) == len(values):
+                changes = NameChanges()
+                changes.feed(values, t)
+                return changes.go_on
+    return False
 
 
 def _values(tables: Mapping[str, ArrayTable], place: str) -> Array:

@@ -26,7 +26,9 @@ from fieldcal.importing.text.text_top import (
     is_number,
     parse_numbers,
     split_cells,
+    with_points,
 )
+from fieldcal.importing.times.one_device import NameChanges
 from fieldcal.importing.words.device_names import (
     may_count,
     tells_devices,
@@ -65,6 +67,7 @@ class ImuInstances(NamedTuple):
     separator : of columns
     names : cells of that column, in the order in which they come
     silent : cells of those whose rows hold only zeros, which are left out
+    clock : number of a column that grows from row to row, or None
     few : cells of those that have hardly any rows, which are left out
 
     """
@@ -73,6 +76,7 @@ class ImuInstances(NamedTuple):
     separator: str | None
     names: tuple[str, ...]
     silent: tuple[str, ...] = ()
+    clock: int | None = None
     few: tuple[str, ...] = ()
 
     @property
@@ -94,7 +98,9 @@ class ImuInstances(NamedTuple):
         """
         many: Counter[str] = Counter()
         live: set[str] = set()
+        changes = NameChanges()
         for lines in pieces:
+            names, times = list[str](), list[float]()
             for line in lines:
                 row = line.split(self.separator)
                 if len(row) <= self.column:
@@ -103,6 +109,14 @@ class ImuInstances(NamedTuple):
                 many[name] += 1
                 if name not in live and _moves(self._beside(row)):
                     live.add(name)
+                if self.clock is not None and len(row) > self.clock:
+                    cell = row[self.clock].strip().strip('"')
+                    if is_number(cell, self.separator != ","):
+                        names.append(name)
+                        times.append(float(with_points(cell)))
+            changes.feed(np.array(names), np.array(times))
+        if changes.go_on:
+            return self._replace(names=self.names[:1])
         late = [n for n in many if n in live and many[n] >= MIN_ROWS]
         names = dict.fromkeys((*self.names, *late))
         silent = tuple(name for name in self.silent if name not in names)
@@ -174,8 +188,22 @@ def named_columns(lines: Sequence[str], separator: str | None) -> list[ImuInstan
             counted = all(is_number(name, False) for name in names)
             said = [row[i] for row in above if tells(row[i])]
             if said and not (counted and any(map(may_count, said))):
-                found.append(ImuInstances(i, parted, tuple(names)))
+                clock = _growing(numbers, i, parted)
+                found.append(ImuInstances(i, parted, tuple(names), clock=clock))
     return found
+
+
+def _growing(
+    rows: Sequence[Sequence[str]], i: int, separator: str | None
+) -> int | None:
+    """Column that never steps back, in the first rows of one name; None if none is."""
+    own = [row for row in rows if row[i] == rows[0][i]]
+    table = parse_numbers([(separator or " ").join(row) for row in own], separator)
+    for at, column in enumerate(table.T):
+        steps = np.diff(column)
+        if at != i and len(steps) and (steps >= 0).all() and steps.any():
+            return at
+    return None
 
 
 def _rows_of(

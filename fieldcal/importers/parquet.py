@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,9 +15,16 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
+from fieldcal.importing.arrays.arrow_fields import (
+    as_texts,
+    column_of,
+    holds_times,
+    is_text,
+    may_name_devices,
+)
 from fieldcal.importing.arrays.nested_arrow import flat_batches, flat_name
 from fieldcal.importing.files.gzip_stream import unpacked_file
-from fieldcal.importing.headings.heading import Column, Heading
+from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.recording import ROWS, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
@@ -26,11 +32,9 @@ from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
 from fieldcal.importing.times.one_device import NameChanges
 from fieldcal.importing.words.device_names import (
-    may_count,
     tells_devices,
     tells_wearers,
 )
-from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.session.arrow_columns import float_values
 from fieldcal.session.sample_files import BYTES_AT_ONCE
 
@@ -38,8 +42,6 @@ WHAT = "Parquet and Arrow"
 
 TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in one of what stored times count."""
-
-_PLACE = re.compile(r"\.([0-2])$")
 
 PARQUET, FEATHER, STREAM = b"PAR1", b"ARROW1", b"\xff\xff\xff\xff"
 
@@ -101,15 +103,15 @@ class ParquetFile(ColumnRecording):
                 field.name
                 for tells in (tells_devices, tells_wearers)
                 for field in schema
-                if tells(field.name) and _may_name(field)
+                if tells(field.name) and may_name_devices(field)
             ]
-            times = [one.name for one in schema if _is_time(one)][:1]
+            times = [one.name for one in schema if holds_times(one)][:1]
         for name in named:
             many: Counter[str] = Counter()
             changes, clock = NameChanges(), ClockText()
             with self._batches(only=(name, *times)) as (_, batches):
                 for batch in batches:
-                    texts = _texts(batch.column(name)).to_pylist()
+                    texts = as_texts(batch.column(name)).to_pylist()
                     many.update(texts)
                     t = self._values(batch.column(times[0]), clock) if times else None
                     if t is not None:
@@ -122,7 +124,7 @@ class ParquetFile(ColumnRecording):
     def heading(self) -> list[Heading]:
         """Names of its columns, with their units."""
         with self._batches() as (schema, _):
-            return [Heading(self.named_by_file([_column(f) for f in schema]))]
+            return [Heading(self.named_by_file([column_of(f) for f in schema]))]
 
     def beginning(self) -> Array:
         """Numbers of its first batch; columns of other things are unknown."""
@@ -175,7 +177,7 @@ class ParquetFile(ColumnRecording):
         if self.device is None:
             return batch
         name, device = self.device
-        return batch.filter(pc.equal(_texts(batch.column(name)), device))
+        return batch.filter(pc.equal(as_texts(batch.column(name)), device))
 
     @contextmanager
     def _whole_batches(
@@ -262,7 +264,7 @@ class ParquetFile(ColumnRecording):
             return ticks * TICKS[kind.unit] / self.wanted.time_scale
         if pa.types.is_floating(kind) or pa.types.is_integer(kind):
             return float_values(column.cast(pa.float64(), safe=False))
-        if not _is_text(kind) or not len(column) or not is_clock(str(column[0])):
+        if not is_text(kind) or not len(column) or not is_clock(str(column[0])):
             return None
         read = (clock.seconds(str(text)) for text in column)
         found = np.array([np.nan if since is None else since for since in read])
@@ -281,53 +283,3 @@ def _gathered(batches: Iterable[Any]) -> Iterator[Any]:
             waiting = []
     if waiting:
         yield from pa.Table.from_batches(waiting).combine_chunks().to_batches()
-
-
-def _may_name(field: Any) -> bool:
-    """Whether a column that is named so holds names or numbers of devices."""
-    import pyarrow as pa
-
-    kind = field.type
-    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
-    counts = bool(pa.types.is_integer(kind))
-    return (counts and not may_count(field.name)) or _is_text(kind)
-
-
-def _is_time(field: Any) -> bool:
-    """Whether a column holds times, by its name or as they are stored."""
-    column = _column(field)
-    said = heading_meaning(column.name, column.unit)
-    return said is not None and said.kind == "t"
-
-
-def _texts(column: Any) -> Any:
-    """A column of names or whole numbers as texts."""
-    import pyarrow as pa
-
-    return column.cast(pa.string())
-
-
-def _is_text(kind: Any) -> bool:
-    import pyarrow as pa
-
-    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
-
-
-def _column(field: Any) -> Column:
-    """A column with its name and unit; one of times is called so."""
-    import pyarrow as pa
-
-    if not (pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type)):
-        # of a list: acc.0 is the axis of an array
-        called = _PLACE.sub(r"[\1]", field.name)
-        return Column(field.name, called, _unit(field))
-    said = heading_meaning(field.name)
-    named = said is not None and said.kind == "t"
-    return Column(field.name, field.name if named else "time", "s")
-
-
-def _unit(field: Any) -> str:
-    """Unit that a column states."""
-    said = field.metadata or {}
-    text: bytes = said.get(b"unit", said.get(b"units", b""))
-    return text.decode(errors="replace")

@@ -154,7 +154,7 @@ def test_one_device_whose_time_goes_on_is_not_divided(
 ) -> None:
     """As where the column of a module says what it did."""
     path, out = tmp_path / "log", tmp_path / "out"
-    write(path, np.arange(len(ONE)) * 3 // len(ONE), ONE)
+    write(path, np.repeat([0, 1, 2], [400, 400, len(ONE) - 800]), ONE)
     assert main(["import", str(path), "-o", str(out)]) == 0
     np.testing.assert_allclose(Session.open(out).block.acc, ONE[:, 1:4], atol=1e-6)
 

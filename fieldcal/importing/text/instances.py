@@ -100,7 +100,7 @@ class ImuInstances(NamedTuple):
         live: set[str] = set()
         changes = NameChanges()
         for lines in pieces:
-            names, times = list[str](), list[float]()
+            said, times = list[str](), list[float]()
             for line in lines:
                 row = line.split(self.separator)
                 if len(row) <= self.column:
@@ -112,9 +112,9 @@ class ImuInstances(NamedTuple):
                 if self.clock is not None and len(row) > self.clock:
                     cell = row[self.clock].strip().strip('"')
                     if is_number(cell, self.separator != ","):
-                        names.append(name)
+                        said.append(name)
                         times.append(float(with_points(cell)))
-            changes.feed(np.array(names), np.array(times))
+            changes.feed(np.array(said), np.array(times))
         if changes.go_on:
             return self._replace(names=self.names[:1])
         late = [n for n in many if n in live and many[n] >= MIN_ROWS]

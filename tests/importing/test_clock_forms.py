@@ -32,6 +32,9 @@ FORMS = {
     "ordinal": at("%Y-%jT%H:%M:%S.%f"),
     "ordinal, colons": at("%Y:%j:%H:%M:%S.%f"),
     "day of the year": at("%j:%H:%M:%S.%f"),
+    "words": at("%B %d %Y %H:%M:%S.%f"),
+    "words, day first": at("%d %B %Y %H:%M:%S.%f"),
+    "mail": at("%a, %d %b %Y %H:%M:%S.%f GMT"),
     "signs": at("%Y年%m月%d日 %H:%M:%S.%f"),
     "all signs": at("%Y年%m月%d日%H时%M分%S.%f秒"),
 }

@@ -23,6 +23,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     FF3A 0012                          counts in hexadecimal digits
     gscale,0.0005                      counts below lines that say what one of them is
     2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
+    23:59:50:07, 0.1, 0.2              frames behind the seconds, as in film: 50.28
     23:59:50.7, 0.1, 0.2               ms behind the seconds without their zeros: 50.007
 
     1,0.01,0.1,0.2,9.8                 a number for the sensor, by what stands above
@@ -75,6 +76,7 @@ from fieldcal.importing.text.text_form import (
 )
 from fieldcal.importing.text.text_lines import split_quoted
 from fieldcal.importing.text.text_top import find_separator, split_cells
+from fieldcal.importing.text.timecodes import Timecodes
 from fieldcal.importing.text.ubx_lines import UbxLines
 from fieldcal.importing.text.vectornav_lines import VectorNavLines
 from fieldcal.importing.text.written_numbers import FortranNumbers, UnitCells
@@ -266,7 +268,7 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 FORMS: tuple[type[TextForm], ...] = (
     DataflashText, MavlinkText, UbxLines, FitCsv, LabviewText, ScaledCounts, RateOnTop,
     ReceiverLines, VectorNavLines, ZephyrLines, SaulLines,
-    CheckedLines, EchoedMessages, EndedLines, DatabasePoints, GroupedDigits,
+    CheckedLines, EchoedMessages, EndedLines, Timecodes, DatabasePoints, GroupedDigits,
     QuotedCells, SpacedCells, PairedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, WordPrefix, BarTable, ListCells,
     SplitDecimals, SensorCodes, TaggedLines, ArrivalPrefix, HexCells, BareFractions,

@@ -47,6 +47,9 @@ NUMBERS = 0.5
 _AXIS = re.compile(r"(.*[^\W_].*?|.*\(|[A-Za-z])([xyzXYZ])(\)?\s*(?:[\[({].*[\])}])?)")
 """A name that ends with an axis, and maybe a unit."""
 
+_SENSOR_AND_UNIT = re.compile(r"(Acc\w*|Gyr\w*)(\s*[\[(].*[\])])?", re.IGNORECASE)
+"""The name of a sensor alone, and maybe a unit."""
+
 _DESCRIBED = re.compile(r"%\w+\(([^()]*)\)")
 """A column as loggers describe it by its type and name: ``%float(RawGyroX)``."""
 
@@ -257,7 +260,10 @@ def _fill_sensor_names(row: Sequence[str]) -> list[str]:
 
     >>> _fill_sensor_names(["t", "Accel (z) [g]", "(x)", "(y)", "gx", "y", "z"])
     ['t', 'Accel (z) [g]', 'Accel (x) [g]', 'Accel (y) [g]', 'gx', 'gy', 'gz']
+    >>> _fill_sensor_names(["cts", "Gyroscope [rad/s]", "1", "2"])
+    ['cts', 'Gyroscope x [rad/s]', 'Gyroscope y [rad/s]', 'Gyroscope z [rad/s]']
     """
+    row = _with_numbered_axes(row)
     found: list[str] = []
     for name in row:
         bare = re.fullmatch(r"\(?([xyzXYZ])\)?", name)
@@ -265,6 +271,19 @@ def _fill_sensor_names(row: Sequence[str]) -> list[str]:
         if bare and before:
             name = f"{before[1]}{bare[1]}{before[3]}"
         found.append(name)
+    return found
+
+
+def _with_numbered_axes(row: Sequence[str]) -> list[str]:
+    """Names of which a sensor's alone is followed by 1 and 2, as GoPro's are exported.
+
+    The axes are called in their order; both sensors of a device have the same.
+    """
+    found = [*row]
+    for i, name in enumerate(row[:-2]):
+        split = _SENSOR_AND_UNIT.fullmatch(name)
+        if [*row[i + 1 : i + 3]] == ["1", "2"] and split is not None:
+            found[i : i + 3] = [f"{split[1]} {axis}{split[2] or ''}" for axis in "xyz"]
     return found
 
 

@@ -29,6 +29,12 @@ _LATE_YEAR = re.compile(
 )
 """What C calls ``ctime``: ``Wed Dec 22 21:09:46 2021``."""
 
+_WORDED = re.compile(
+    r"(?:[A-Z][a-z]+, )?(\d{1,2}|[A-Z][a-z]{2,8})[ .]+([A-Z][a-z]{2,8}|\d{1,2}),? "
+    r"(\d{4}),? (\d{1,2}:\d\d:.*)"
+)
+"""Dates in words: ``Mon, 05 Jan 2026 11:59:45 GMT`` of RFC 5322, ``January 5 2026``."""
+
 _DIGITS = r"(0[1-9]|1[0-2])([0-2]\d|3[01]){}([01]\d|2[0-3])([0-5]\d)([0-5]\d|60)"
 _BASIC = re.compile(rf"(\d{{4}}){_DIGITS.format('[T _-]')}([.,]\d+)?(\D.*)?")
 """Basic format of ISO 8601, which leaves the signs out: ``20260314T101530.250Z``."""
@@ -113,6 +119,10 @@ def _usual_form(text: str) -> str:
     if (signs := _SIGNS.fullmatch(text)) is not None:
         year, month, day, hour, minute, second = signs.groups()
         return f"{year}-{month}-{day}T{hour}:{minute}:{second}"
+    if (worded := _WORDED.fullmatch(text)) is not None:
+        first, second, year, rest = worded.groups()
+        month, day = (second, first) if first.isdecimal() else (first, second)
+        return f"{day}-{month[:3]}-{year} {rest}"
     said = _LATE_YEAR.fullmatch(text)
     if said is None:
         return text

@@ -81,3 +81,11 @@ def test_without_turns_the_user_says_that_a_timer_counts_down(
     assert main([*call, "-t,ax,ay,az"]) == 0
     t = Session.open(out).block.t
     np.testing.assert_allclose(t - t[0], ROWS[:, 0], atol=1e-6)
+
+
+@given(st.integers(0, 999), st.lists(st.integers(0, 400)))
+def test_parts_of_a_second_go_on_in_the_next(began: int, cuts: list[int]) -> None:
+    ms = began + 10 * np.arange(400)
+    t, says = counted(ms % 1000.0, cuts, "ms")
+    np.testing.assert_allclose(np.diff(t), 0.01, atol=1e-9)
+    assert says == ["its clock ends at 1 s and begins again: the times behind go on"]

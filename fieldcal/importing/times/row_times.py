@@ -33,6 +33,10 @@ LONG_PERIOD = 10.0
 PERIODS = (60.0, 3600.0, 86400.0, 604800.0)
 """Where clocks begin again, s: a minute, an hour, a day, a week."""
 
+SECOND, PART_STEPS = 1.0, 2.0
+"""Where parts of a second begin again that are written without it, s, and the usual
+steps within which they do: a device may be started again after a second."""
+
 NEAR_STEPS = 20.0
 """Usual steps by which a clock is before its end, and behind its beginning."""
 
@@ -229,8 +233,11 @@ class RowTimes:
         counted = own + [p for p in DIVIDED if p > LONG_PERIOD * near]
         signed = [(-p / 2, p) for p in counted]
         unsigned = [(0.0, p) for p in (*counted, *PERIODS)]
+        if LONG_PERIOD * PART_STEPS * self._usual < SECOND:
+            unsigned.append((0.0, SECOND))
         for low, period in (*unsigned, *signed):
-            if 0 <= began - low < near and 0 < low + period - before < near:
+            within = PART_STEPS * self._usual if period == SECOND else near
+            if 0 <= began - low < within and 0 < low + period - before < within:
                 said = (
                     f"its clock ends at {low + period:g} s and begins again"
                     f"{f' at {low:g} s' if low else ''}: the times behind go on"

@@ -225,15 +225,6 @@ def test_each_of_several_imus_has_its_own_time() -> None:
     ]  # fmt: skip
 
 
-def test_a_barometer_is_the_last_thermometer_that_is_taken() -> None:
-    (found,) = match_headings([Column("", n) for n in (*BARE, "baro_temp")], "_")
-    assert found.columns[-1] == "temperature" and "that of the baro" in found.says[0]
-    (found,) = match_headings(
-        [Column("", n) for n in (*BARE, "baro_temp", "temp")], "_"
-    )
-    assert found.columns[-2:] == ("_", "temperature") and not found.says
-
-
 def test_a_covariance_is_no_axis_and_topics_are_no_imus_of_their_own() -> None:
     names = ["__time", *(f"/imu/data/angular_velocity/{x}" for x in "xyz"),
              "/imu/data/angular_velocity_covariance[0]", "/imu/data/header/stamp",
@@ -247,56 +238,6 @@ def test_a_covariance_is_no_axis_and_topics_are_no_imus_of_their_own() -> None:
 def test_two_columns_of_an_axis_leave_a_choice() -> None:
     names = ["t", "ax", "ay", "az", "az", "gx", "gy", "gz"]
     assert match_headings([Column("", name) for name in names], "_") == ()
-
-
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [("imu_degC", "degC"), ("temp (C)", "degC"), ("°C", "degC"), ("T_K", "K"),
-     ("die [°C]", "degC"), ("mpu.celsius", "degC"), ("temp_F", "degF"),
-     ("temp (F)", "degF"),
-     ("Temperature (°F)", "degF"), ("T [K]", "K"), ("sensor degF", "degF")],
-)  # fmt: skip
-def test_a_thermometer_that_only_its_unit_names_is_taken(name: str, unit: str) -> None:
-    (found,) = match_headings([Column("", n) for n in (*BARE, name)], "_")
-    assert found.columns[-1] == "temperature"
-    assert found.taken(ReadOptions()).temp_unit == unit
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "roll (°)",
-        "heading [°]",
-        "quat_c",
-        "step_k",
-        "mag_x (K)",
-        "roll_F",
-        "x (°C)",
-        "C",
-    ],
-)
-def test_what_may_be_something_else_is_no_thermometer(name: str) -> None:
-    (found,) = match_headings([Column("", n) for n in (*BARE, name)], "_")
-    assert found.columns[-1] == "_"
-
-
-def test_thermometers_that_only_units_name_leave_no_choice() -> None:
-    def columns(*names: str) -> tuple[str, ...]:
-        (found,) = match_headings([Column("", n) for n in (*BARE, *names)], "_")
-        return found.columns[len(BARE) :]
-
-    assert columns("a_degC", "b_degC") == ("_", "_")
-    assert columns("a_degC", "motor_degC") == ("temperature", "_")
-    assert columns("a_degC", "temp") == ("_", "temperature")
-
-
-@pytest.mark.parametrize("unit", ["K", "degF"])
-def test_a_thermometer_in_other_units_reads_deg_c(tmp_path: Path, unit: str) -> None:
-    warm = {"K": 300.15, "degF": 80.6}[unit]
-    path = text(tmp_path / "log", (*NAMES, f"temp [{unit}]"))
-    rows = [",".join([*map(str, row), str(warm)]) for row in ROWS.tolist()]
-    path.write_text("\n".join([",".join([*NAMES, f"temp [{unit}]"]), *rows]) + "\n")
-    np.testing.assert_allclose(taken(path)[1].temperature, 27.0)
 
 
 @given(st.text(max_size=12), st.sampled_from(["", "[degC]", " °C", "_K", "(C)"]))

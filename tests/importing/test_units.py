@@ -145,72 +145,6 @@ def test_what_is_no_usual_unit_is_asked(
     assert asks in said and said.count("\n") == 1 and not out.exists()
 
 
-@pytest.mark.parametrize(
-    ("rate", "code", "why"),
-    [((0.01, 0, 0), 0, "rad/s: it is the usual one, and no turn tells"),
-     # of rates about the force a turntable may be the reason, of others only a bias
-     ((0, 0, 3.0), 2, "is no rest: add --gyr-unit deg/s or --gyr-unit rad/s"),
-     ((3.0, 0, 0), 2, "is no rest: add --gyr-unit deg/s")],
-)  # fmt: skip
-def test_rates_of_which_no_turn_tells_are_said_or_asked(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    rate: tuple[float, float, float],
-    code: int,
-    why: str,
-) -> None:
-    rng = np.random.default_rng(4)
-    n = 1000
-    acc = [0, 0, G] + rng.normal(0, 0.02, (n, 3))
-    gyr = rate + rng.normal(0, 0.002, (n, 3))
-    path = write(tmp_path, np.column_stack([np.arange(n) / 50, acc, gyr]))
-    out = tmp_path / "out"
-    assert main(["import", str(path), "--columns", COLUMNS, "-o", str(out)]) == code
-    assert why in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("reads", "celsius"),
-    [((24.0, 30.0), None), ((-20.0, -5.0), None), ((2400, 3000), (24.0, 30.0)),
-     ((63123, 65249), "asked"), ((296.0, 301.0), (22.85, 27.85)), ((180, 200), "asked"),
-     ],
-)  # fmt: skip
-def test_temperatures(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    reads: tuple[float, float],
-    celsius: object,
-) -> None:
-    rows = turned(5, 50.0)
-    warm = np.linspace(*reads, len(rows))
-    path, out = write(tmp_path, np.column_stack([rows, warm])), tmp_path / "out"
-    call = ["import", str(path), "--columns", f"{COLUMNS},temperature", "-o", str(out)]
-    if celsius == "asked":
-        assert main(call) == 2
-        said = capsys.readouterr().err
-        assert "which is no deg C: add --temp-unit count" in said
-        assert main([*call, "--temp-unit", "none"]) == 0
-        assert np.isnan(Session.open(out).block.temperature).all()
-        return
-    assert main(call) == 0
-    session = Session.open(out)
-    expected = reads if celsius is None else celsius
-    found = session.block.temperature[[0, -1]]
-    np.testing.assert_allclose(found, np.array(expected), atol=1e-6)
-    assert ("temperature" in session.about.raw.get("guessed", {})) == bool(celsius)
-
-
-def test_counts_of_temperature_are_scaled_as_said(tmp_path: Path) -> None:
-    rows = turned(6, 20.0)
-    counts = np.linspace(0, 1024, len(rows))
-    path, out = write(tmp_path, np.column_stack([rows, counts])), tmp_path / "out"
-    call = ["import", str(path), "--columns", f"{COLUMNS},temperature", "-o", str(out)]
-    call += ["--temp-unit", "count", "--temp-lsb", "256", "--temp-zero", "25"]
-    assert main(call) == 0
-    found = Session.open(out).block.temperature[[0, -1]]
-    np.testing.assert_allclose(found, [25, 29])
-
-
 @given(
     st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=3),
     st.floats(1e-2, 1e5),
@@ -236,30 +170,6 @@ def test_few_directions_make_no_sphere(points: Array) -> None:
     found = estimate_gravity(points + noise)
     assert found is not None and not found.round
     assert found.size == pytest.approx(np.median(np.linalg.norm(points, axis=1)), 0.01)
-
-
-@pytest.mark.parametrize("unit", ["rad/s", "deg/s"])
-def test_clipped_rates_tell_their_unit_by_what_is_not(
-    tmp_path: Path, unit: str
-) -> None:
-    rows = turned(9, 50.0)
-    rows[:, 4:] = np.clip(rows[:, 4:], -1.5, 1.5)
-    log = np.column_stack([rows[:, :4], rows[:, 4:] * GYR[unit]])
-    path, out = write(tmp_path, log), tmp_path / "out"
-    assert main(["import", str(path), "--columns", COLUMNS, "-o", str(out)]) == 0
-    np.testing.assert_allclose(Session.open(out).block.gyr, rows[:, 4:], atol=1e-6)
-
-
-@pytest.mark.parametrize("per_rad", [1.0, 180 / np.pi])
-@pytest.mark.parametrize("rate", [50.0, 200.0])
-def test_angles_gained_beside_forces_are_told_by_the_turns(
-    tmp_path: Path, per_rad: float, rate: float
-) -> None:
-    """As a fibre-optic device writes them: force in g, rad since the row before."""
-    rows = turned(9, rate)
-    log = np.column_stack([rows[:, 0], rows[:, 1:4] / G, rows[:, 4:] * per_rad / rate])
-    block, _ = read_files([write(tmp_path, log)])
-    np.testing.assert_allclose(block.six, rows[:, 1:], atol=1e-6)
 
 
 @pytest.mark.parametrize("lsb", [256.0, 2048.0])
@@ -356,34 +266,3 @@ def test_steps_of_a_power_of_two_are_those_of_g(tmp_path: Path) -> None:
         else:
             with pytest.raises(InputError, match="gravity in no usual unit"):
                 read_files([path])
-
-
-@pytest.mark.parametrize("lsb", [14.375, 1 / 0.07])
-def test_counts_that_two_gyroscopes_have_are_asked_about(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], lsb: float
-) -> None:
-    """Beside an ADXL345 stands an ITG-3200, or one by ST 0.6 % off it."""
-    table = turned(7, 100.0)
-    table[:, 1:4] = np.round(table[:, 1:4] / G * 256)
-    table[:, 4:] = np.round(np.rad2deg(table[:, 4:]) * lsb)
-    path = write(tmp_path, table, heading=COLUMNS)
-    assert main(["import", str(path)]) == 2
-    asked = capsys.readouterr().err
-    assert "--gyr-lsb 14.375" in asked
-    assert "--gyr-lsb 14.2857" in asked
-
-
-@pytest.mark.parametrize(
-    ("unit", "of_one"), [("milli deg", 1000), ("mdegC", 1000), ("c°C", 100)]
-)
-def test_parts_of_a_degree_are_what_a_heading_says(
-    tmp_path: Path, unit: str, of_one: float
-) -> None:
-    table = turned(8, 50.0)
-    warm = np.linspace(21.5, 26.5, len(table))
-    rows = np.column_stack([table, np.round(warm * of_one)])
-    path = write(tmp_path, rows, heading=f"{COLUMNS},Temperature [{unit}]")
-    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
-    np.testing.assert_allclose(
-        Session.open(tmp_path / "out").block.temperature, warm, atol=0.51 / of_one
-    )

@@ -70,6 +70,17 @@ def test_numbers_with_a_low_line_are_no_clock(number: str) -> None:
     assert not is_clock(number)
 
 
+@given(st.text(alphabet="0123456789-:T/. 年月日Mar,_", max_size=30))
+def test_no_text_breaks_the_reader(text: str) -> None:
+    assert isinstance(is_clock(text), bool)
+    ClockText().seconds(text)
+
+
+@pytest.mark.parametrize("text", ["9999-999T10:10:10", "2026-000T99:99:99"])
+def test_days_that_no_year_has_break_nothing(text: str) -> None:
+    ClockText().seconds(text)
+
+
 def written(form: str, first: datetime, many: int, step: float) -> list[str]:
     return [(first + timedelta(seconds=step * i)).strftime(form) for i in range(many)]
 

@@ -100,6 +100,15 @@ class ImuInstances(NamedTuple):
         live: set[str] = set()
         changes = NameChanges()
         for lines in pieces:
+            if not lines:
+                continue
+            only = self._only_name(lines)
+            first, last = (self._time(lines[i]) for i in (0, -1))
+            if only in live and first is not None and last is not None:
+                # of a long file with one device, most pieces
+                many[only] += len(lines)
+                changes.skip(only, first, last, len(lines))
+                continue
             said, times = list[str](), list[float]()
             for line in lines:
                 row = line.split(self.separator)
@@ -109,11 +118,9 @@ class ImuInstances(NamedTuple):
                 many[name] += 1
                 if name not in live and _moves(self._beside(row)):
                     live.add(name)
-                if self.clock is not None and len(row) > self.clock:
-                    cell = row[self.clock].strip().strip('"')
-                    if is_number(cell, self.separator != ","):
-                        said.append(name)
-                        times.append(float(with_points(cell)))
+                if (since := self._time(line)) is not None:
+                    said.append(name)
+                    times.append(since)
             changes.feed(np.array(said), np.array(times))
         if changes.go_on:
             return self._replace(names=self.names[:1])
@@ -129,6 +136,21 @@ class ImuInstances(NamedTuple):
         known = [*self.names, *self.silent, *self.few]
         several = 1 < len(known) <= MAX_NAMED and bool(self.names)
         return several and "" not in known and not _are_sensors(known)
+
+    def _only_name(self, lines: Sequence[str]) -> str:
+        """Name in all lines; "" where they differ."""
+        places = (line.split(self.separator, self.column + 1) for line in lines)
+        found = {row[self.column] if len(row) > self.column else "" for row in places}
+        return found.pop().strip().strip('"') if len(found) == 1 else ""
+
+    def _time(self, line: str) -> float | None:
+        """Number of the clock in a line, as far as it has one."""
+        if self.clock is None:
+            return None
+        row = line.split(self.separator, self.clock + 1)
+        cell = row[self.clock].strip().strip('"') if len(row) > self.clock else ""
+        number = is_number(cell, self.separator != ",")
+        return float(with_points(cell)) if number else None
 
     def _beside(self, row: Sequence[str]) -> Sequence[str]:
         """Cells behind the name; those before it where hardly any are behind."""

@@ -50,6 +50,14 @@ class NameChanges:
         # a few of each piece tell what is usual
         self._steps.append(steps[~differ][:1000])
 
+    def skip(self, name: str, first: float, last: float, many: int) -> None:
+        """Take so many rows of one name in, by the times of the first and the last."""
+        if self._last is not None and name != self._last[0]:
+            self.changes += 1
+            self._across.append(np.array([first - self._last[1]]))
+        self._last = (name, last)
+        self.rows += many
+
     @property
     def go_on(self) -> bool:
         """Whether the time goes on wherever the name changes."""

@@ -30,7 +30,7 @@ from fieldcal.importing.recording import ROWS, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
-from fieldcal.importing.times.one_device import NameChanges
+from fieldcal.importing.times.name_changes import NameChanges
 from fieldcal.importing.words.device_names import (
     tells_devices,
     tells_wearers,

@@ -24,7 +24,7 @@ from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
 from fieldcal.importing.files.gzip_stream import unpacked_file
 from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
-from fieldcal.importing.times.one_device import NameChanges
+from fieldcal.importing.times.name_changes import NameChanges
 from fieldcal.importing.words.device_names import tells_devices, tells_wearers
 from fieldcal.importing.words.heading_words import heading_meaning
 

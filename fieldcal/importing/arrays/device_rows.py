@@ -16,7 +16,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.importing.arrays.array_tables import ArrayTable, columns_of
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
-from fieldcal.importing.times.one_device import NameChanges
+from fieldcal.importing.times.name_changes import NameChanges
 from fieldcal.importing.words.device_names import (
     may_count,
     tells_devices,

@@ -28,7 +28,7 @@ from fieldcal.importing.text.text_top import (
     split_cells,
     with_points,
 )
-from fieldcal.importing.times.one_device import NameChanges
+from fieldcal.importing.times.name_changes import NameChanges
 from fieldcal.importing.words.device_names import (
     may_count,
     tells_devices,

@@ -1,4 +1,4 @@
-"""Names of rows that change while the time of one device goes on, and of two devices."""
+"""Names of rows that change while the time of one device goes on, and of others."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.times.one_device import NameChanges
+from fieldcal.importing.times.name_changes import NameChanges
 
 T = np.arange(600) / 50
 NAMES = np.repeat(["a", "b", "c"], 200)

@@ -34,7 +34,11 @@ WITHOUT_GRAVITY = ("lx", "ly", "lz")
 SPANS = {"a": "dv_us", "g": "da_us"}
 """Columns of the time, us, over which velocity and angle were gained in a row."""
 
-KNOWN = (*SAMPLE_COLUMNS, "dt", *CLOCK_PARTS, *WITHOUT_GRAVITY, *SPANS.values())
+LOW_WORDS = tuple(f"low_{channel}" for channel in CHANNELS)
+"""Columns of the lower 16 bits of counts of 32."""
+
+KNOWN = (*SAMPLE_COLUMNS, "dt", *CLOCK_PARTS, *WITHOUT_GRAVITY, *SPANS.values(),
+         *LOW_WORDS)  # fmt: skip
 """What columns may be called."""
 
 
@@ -156,6 +160,8 @@ class ColumnReader:
                     signed = (
                         to_signed_16_bit(column) if kind in wanted.unsigned else column
                     )
+                    low = columns.get(f"low_{kind}{'xyz'[i]}")
+                    signed = signed if low is None else _with_low_word(signed, low)
                     sign = -1.0 if kind + "xyz"[i] in wanted.reversed else 1.0
                     with np.errstate(invalid="ignore"):  # of a nan that signals
                         np.multiply(signed, sign * scale, out=table[i])
@@ -187,6 +193,16 @@ class ColumnReader:
         self._last = float(known[-1])
         repeated: Array = known[np.cumsum(~again)]
         return repeated
+
+
+def _with_low_word(high: Array, low: Array) -> Array:
+    """Counts with the bits below them, which may have been read with a sign.
+
+    >>> _with_low_word(np.array([-1.0, 5.0]), np.array([32768.0, -16384.0])).tolist()
+    [-0.5, 5.75]
+    """
+    whole: Array = high + np.mod(low, 2 * HALF) / (2 * HALF)
+    return whole
 
 
 def _celsius_column(column: Array | None, size: float, zero: float) -> Array | None:

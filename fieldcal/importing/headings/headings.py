@@ -19,7 +19,7 @@ from fieldcal.importing.headings.filtered_axes import (
     without_filtered,
 )
 from fieldcal.importing.headings.heading import Column, HeadingMatch
-from fieldcal.importing.headings.low_words import without_low_words
+from fieldcal.importing.headings.low_words import lower_halves, split_low_words
 from fieldcal.importing.headings.numbered_axes import with_lettered_axes
 from fieldcal.importing.headings.repeated_names import with_distinct_names
 from fieldcal.importing.headings.thermometer_columns import thermometer
@@ -94,7 +94,7 @@ def match_headings(
         and (said := heading_meaning(column.name, column.unit)) is not None
         and (said.kind == "t" or not _is_no_sample(said))
     ]
-    named, low = without_low_words(named)
+    named, low = split_low_words(named)
     named, filtered = without_filtered(named)
     named = best_columns(columns, named)
     acc, gyr = triads(named, "a"), triads(named, "g")
@@ -121,16 +121,14 @@ def match_headings(
         rest += [n for n in named if n.says.kind == "t_host"][:1]
         clock = plainest(columns_of_imu(times, label) or times, OTHER_CLOCK)
         clock = [nearest_before(clock[0], times, both, columns)] if clock else steps
-        chosen = [*clock, *parts, *both, *spans, *apart, *warm, *rest]
+        halves = lower_halves(low, both)
+        chosen = [*clock, *parts, *both, *halves, *spans, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
     if left := [three for three in gyr.values() if acc and three not in rates.values()]:
         told = _left_out(list_names(columns, left[0]))
         found[0] = replace(found[0], says=(*found[0].says, told))
     taken = [n for three in (*acc.values(), *gyr.values()) for n in three]
     told_of_filters = tell_filtered(columns, filtered, taken)
-    if low:
-        lower = f"{list_names(columns, low)}: lower halves of words; left out, so that"
-        told_of_filters.append(f"{lower} a step is one of 16 bits")
     found[0] = replace(found[0], says=(*found[0].says, *told_of_filters))
     if len(found) == 1:
         found = [replace(found[0], name="0")]

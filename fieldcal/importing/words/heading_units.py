@@ -96,6 +96,8 @@ UNITS = {
     "t_host": (),
     "v": ("m/s^2", "g", "mg"),
     "l": (),
+    "low_a": (),
+    "low_g": (),
     "dv_us": (),
     "da_us": (),
     "": ("m/s^2", "g", "mg", *TELLING),

@@ -1,9 +1,9 @@
 """Lower halves of words of 32 bits, which programs write as columns of their own.
 
-``XGYRO_LOW`` beside ``XGYRO_OUT``: registers of the sensors of Analog Devices, whose
-user registers hold 16 bits each (data sheet of the ADIS16495: X_GYRO_LOW holds the
-additional bits of X_GYRO_OUT). Without them every number is rounded down, which is a
-bias of half a step.
+``XGYRO_LOW`` beside ``XGYRO_OUT``: registers of the sensors of Analog Devices, which
+hold 16 bits each (data sheet of the ADIS16375, table 10, and of the ADIS16135, table 8:
+the lower and the upper 16 bits). Without the lower ones every number is rounded down,
+which is a bias of half a step.
 """
 
 from __future__ import annotations

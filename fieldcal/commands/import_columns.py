@@ -35,13 +35,12 @@ def add_column_options(parser: argparse.ArgumentParser) -> None:
     add(
         "--acc-unit",
         default="",
-        help="m/s^2, mm/s^2, cm/s^2, ft/s^2, in/s^2, g, mg, ug, V, count",
+        help="m/s^2, mm/s^2, cm/s^2, ft/s^2, g, mg, ug …, V, count",
     )
     add(
         "--gyr-unit",
         default="",
-        help="rad/s, mrad/s, urad/s, deg/s, mdeg/s, udeg/s, deg/h, rev/s, rpm, V,"
-        " count",
+        help="rad/s, mrad/s, deg/s, mdeg/s, deg/h, rpm …, V, count",
     )
     add(
         "--time-unit",

@@ -36,12 +36,14 @@ class Added(NamedTuple):
     block : the samples
     about : what was added, a few words
     where : what tells it from others of its kind: channel, instant, ...
+    hides : effects that nobody can see behind it
 
     """
 
     block: Block
     about: str
     where: Mapping[str, float | str] = {}
+    hides: tuple[str, ...] = ()
 
 
 class CannotShow(Exception):  # the recording is no place for it

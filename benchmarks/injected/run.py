@@ -161,7 +161,7 @@ def outcome(
         any(judging.is_said(before, effect, added.where)),
         named,
         aliased,
-        judging.lost(before, after),
+        tuple(i for i in judging.lost(before, after) if i not in added.hides),
         judging.invented(before, after, effect),
         judging.summary(after),
         took,

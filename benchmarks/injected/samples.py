@@ -9,7 +9,7 @@ a mild and a strong case of it:
     saturation    rails that one window, or the rates of turns, just reach, or overrun
     quantisation  steps of 1.4 or 1.8 times the noise, which do not move the means yet
     decode_fault  the low byte of a 16-bit count taken for a signed one
-    smoothing     a low-pass of first order over 10 or 40 samples, in full precision
+    smoothing     a low-pass of first order, 0.3 or 0.8 s, in full precision
 """
 
 from __future__ import annotations
@@ -201,13 +201,13 @@ def smoothing(scene: Scene, sigmas: float, rng: Rng) -> Added:
 
     Missing samples are passed over, as its program does not see them.
     """
-    samples = (40.0 if sigmas > STRONG else 10.0) * float(rng.uniform(0.7, 1.4))
-    kept, six = np.exp(-1 / samples), scene.block.six.copy()
+    tau = (0.8 if sigmas > STRONG else 0.3) * float(rng.uniform(0.7, 1.4))
+    kept, six = np.exp(-1 / tau / scene.rate_hz), scene.block.six.copy()
     known = np.isfinite(six).all(axis=1)
     begin = six[known][:1]
     share = [1 - kept], [1.0, -kept]
     six[known] = lfilter(*share, six[known] - begin, axis=0) + begin
-    return Added(scene.but(six), f"{samples:.1f} samples", {})
+    return Added(scene.but(six), f"{tau:.2f} s", hides=("quantisation", "saturation"))
 
 
 CHAIN = {

@@ -14,6 +14,7 @@ over N samples leave noise whose slow parts are missing. Source: model of this p
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,14 +38,28 @@ MOST_SAMPLES = 1 << 16
 LEAST_TIME = 5.0
 """Least time constant, samples: less is left to the noise of the windows."""
 
-SLOW_PARTS = 0.3
+SLOW_PARTS = 0.2
 """Least variance of means of what (2) leaves, times their length, as a share of that of
 samples: 1 of white noise, more behind the filter of a sensor, and next to none of a
 sensor that was not smoothed."""
 
+MOST_SLOW_PARTS = 2.0
+"""The most of them where noise alone tells k: a sensor's slow walk is no filter."""
+
+SLOW_NOISE = 0.2
+"""Share of a time constant by which slow parts of sensors' noise lengthen what noise
+tells: a standard deviation over the real recordings that were smoothed for a test."""
+
 FAR_APART = 0.3
 """Largest correlation of what (2) leaves beyond the memory of a sensor's filter: a mean
 over N samples leaves -0.5 at N, and a filter of second order much of itself."""
+
+LEFT_BESIDE = 0.1
+"""Covariance of neighbours, as a share of their variance, that real sensors have of
+their own: white noise behind a filter leaves up to half."""
+
+ALIKE = 3.0
+"""Standard deviations by which two sensors may differ that one program smooths."""
 
 AWAY = 6.0
 """Standard deviations of a sample by which a device is not yet at rest: once in 1e9."""
@@ -74,11 +89,7 @@ def find_smoothing(
         _of_sensor(held, steps[triad])
         for held, triad in zip(rests, (ACC, GYR), strict=True)
     )
-    if acc and not gyr:
-        gyr = _of_other_sensor(rests[1], acc)
-    if gyr and not acc:
-        acc = _of_other_sensor(rests[0], gyr)
-    return _common(acc, gyr)
+    return _common(acc, gyr, rests)
 
 
 def without_smoothing(outputs: Array, t: Array, kept: float) -> Array:
@@ -128,27 +139,32 @@ def _of_sensor(rests: Sequence[Array], step: Array) -> Share | None:
     return found if found and _is_slow(found) else None
 
 
-def _of_other_sensor(rests: Sequence[Array], found: Share) -> Share | None:
-    """Smoothing of a sensor, if its slow parts say that it is that of the other one."""
-    late = [RestSums.of(y[len(y) // 3 :]) for y in rests]
-    if not late:
-        return None
-    return found if 1 + 2 * _correlation(late, found).sum() > SLOW_PARTS else None
+def _common(
+    acc: Share | None, gyr: Share | None, rests: Sequence[Sequence[Array]]
+) -> tuple[Share | None, Share | None]:
+    """The same for both sensors, where they allow it: one program smooths both alike.
 
-
-def _common(acc: Share | None, gyr: Share | None) -> tuple[Share | None, Share | None]:
-    """The mean of both, for both, where they differ by no more than chance.
-
-    One program smooths both alike; if it were not alike, one would be late.
+    If it were not alike, one would be late.
     """
-    if acc is None or gyr is None or acc is gyr:
-        return acc, gyr
-    if abs(acc.kept - gyr.kept) > SURELY * np.hypot(acc.sigma, gyr.sigma):
-        return acc, gyr
-    weight = np.array([acc.sigma**-2, gyr.sigma**-2])
-    kept = float(weight @ [acc.kept, gyr.kept] / weight.sum())
-    both = Share(kept, float(weight.sum() ** -0.5))
-    return both, both
+    if acc is None or gyr is None:
+        one, other = (gyr, rests[0]) if acc is None else (acc, rests[1])
+        both = one if one and _slow_parts(other, one) > SLOW_PARTS else None
+        return both or acc, both or gyr
+    if abs(acc.kept - gyr.kept) < ALIKE * np.hypot(acc.sigma, gyr.sigma):
+        weight = np.array([acc.sigma**-2, gyr.sigma**-2])
+        kept = float(weight @ [acc.kept, gyr.kept] / weight.sum())
+        both = Share(kept, float(weight.sum() ** -0.5))
+        return both, both
+    better, other = (acc, rests[1]) if acc.sigma < gyr.sigma else (gyr, rests[0])
+    if 1 / MOST_SLOW_PARTS < _slow_parts(other, better) < MOST_SLOW_PARTS:
+        return better, better
+    return acc, gyr
+
+
+def _slow_parts(rests: Sequence[Array], found: Share) -> float:
+    """Variance of means of what (2) leaves of a sensor, by that of samples."""
+    late = [RestSums.of(y[len(y) // 3 :]) for y in rests]
+    return 1 + 2 * float(_correlation(late, found).sum()) if late else 0.0
 
 
 def _is_slow(found: Share) -> bool:
@@ -161,12 +177,15 @@ def _is_program(still: Sequence[RestSums], found: Share, step: Array) -> bool:
     single, beside = autocovariance(added, 1)
     if not single.all():
         return False
-    allowed = step**2 / 6 + SURELY * single / np.sqrt(sum(len(e) for e in added))
-    if np.any(-beside / found.kept > allowed):
+    chance = SURELY / np.sqrt(sum(len(e) for e in added))
+    allowed = step**2 / 6 + (chance + LEFT_BESIDE) * single
+    if np.median(-beside / found.kept - allowed) > 0:  # one axis may have its own noise
         return False
     beside = _correlation(still, found)
-    far = np.abs(beside[OWN_SAMPLES:]).max()
-    return bool(1 + 2 * beside.sum() > SLOW_PARTS and far < FAR_APART)
+    slow, far = 1 + 2 * float(beside.sum()), float(np.abs(beside[OWN_SAMPLES:]).max())
+    by_noise = found.sigma > SLOW_NOISE * (1 - found.kept)
+    most = 1 / SLOW_PARTS if not by_noise else MOST_SLOW_PARTS
+    return SLOW_PARTS < slow < most and far < FAR_APART
 
 
 def _correlation(still: Sequence[RestSums], found: Share) -> Array:
@@ -184,13 +203,20 @@ def _correlation(still: Sequence[RestSums], found: Share) -> Array:
     return out + len(added) / sum(len(e) for e in added)
 
 
-def _with_decays(rests: Sequence[Array], found: Share) -> Share:
-    """K by all samples from which on the device rests, decays among them."""
+def _with_decays(rests: Sequence[Array], by_noise: Share) -> Share:
+    """K by all samples from which on the device rests, decays among them.
+
+    Where decays add little, k is known as well as noise can tell it.
+    """
+    found = by_noise
     for _ in range(ROUNDS):
         held = [y[_rest_begin(y, found.kept) :] for y in rests]
         parts = [RestSums.of(y) for y in held if len(y) >= MIN_SAMPLES]
         again = share_kept(parts, near=found) if parts else None
         found = again if again and _is_slow(again) else found
+    slow = SLOW_NOISE * (1 - found.kept)
+    if found.sigma > by_noise.sigma / 3:
+        return replace(found, sigma=float(np.hypot(found.sigma, slow)))
     return found
 
 

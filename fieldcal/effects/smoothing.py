@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.core.samples import ACC, CHANNELS, GYR
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
@@ -44,36 +45,37 @@ class Smoothing(Chain):
     source = "model of this project"
 
     def find(self, recording: CheckedSamples) -> list[Fault]:
-        """The time constant of each sensor whose outputs are smoothed."""
+        """The time constants of the sensors whose outputs are smoothed."""
         block = recording.block
         six, t = block.six, block.t
         interval = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+        values: dict[str, float] = {}
+        sigmas: dict[str, float] = {}
+        channels: list[str] = []
         both = find_smoothing(six, recording.windows, recording.steps)
-        out = []
         for name, triad, found in zip(("acc", "gyr"), (ACC, GYR), both, strict=True):
             if found is None or interval * found.samples < LEAST_S:
                 continue
             six = six.copy()
             six[:, triad] = without_smoothing(six[:, triad], t, found.kept)
-            out.append(
-                Fault(
-                    channel=CHANNELS[triad][0],
-                    values={name: interval * found.samples},
-                    sigmas={name: interval * found.samples_sigma},
-                    from_s=float(t[0]),
-                    to_s=float(t[-1]),
-                    mended=six,
-                    channels=tuple(CHANNELS[triad]),
-                )
-            )
-        return out
+            values[name] = interval * found.samples
+            sigmas[name] = interval * found.samples_sigma
+            channels += CHANNELS[triad]
+        if not channels:
+            return []
+        ends = float(t[0]), float(t[-1])
+        return [Fault(channels[0], values, sigmas, *ends, mended=six,
+                      channels=tuple(channels))]  # fmt: skip
 
     def say_repaired(self, fault: Fault) -> str:
-        """Which sensor, and with what time constant."""
-        sensor = "accelerometers" if "acc" in fault.values else "gyroscopes"
-        (name,) = fault.values
+        """Which sensors, and with what time constants."""
+        each = []
+        for name, sigma in fault.sigmas.items():
+            value, error = format_with_sigma(float(fault.values[name]), sigma)
+            sensor = "accelerometers" if name == "acc" else "gyroscopes"
+            each.append(f"{value} ± {error} s ({sensor})")
         return (
-            f"{sensor}: a program smoothed the outputs with a time constant of"
-            f" {fault.values[name]:.3g} ± {fault.sigmas[name]:.1g} s, which is undone"
-            " here; record them as the device sends them"
+            "a program smoothed the outputs, with a time constant of"
+            f" {' and '.join(each)}: this is undone here; record them as the device"
+            " sends them"
         )

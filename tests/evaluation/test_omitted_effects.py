@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -81,9 +82,10 @@ def test_smoothed_outputs_are_calibrated_as_the_device_sends_them(
     code, said = solved(profile, tmp_path / "s", capsys, model=UNEXAMINED["model"])
     assert code == 0 and said["verdict"] == "good"
     assert np.abs(off(said, profile)).max() < 4.5
-    undone = [w for w in said["warnings"] if "a program smoothed the outputs" in w]
-    seconds = [float(w.split("time constant of ")[1].split()[0]) for w in undone]
+    (undone,) = (w for w in said["warnings"] if "a program smoothed the outputs" in w)
+    seconds = [float(part.split(" ±")[0]) for part in re.findall(r"[\d.]+ ±", undone)]
     assert seconds == pytest.approx(list(tau.values()), rel=0.1)
+    assert ("accelerometers" in undone) == ("acc" in tau) and "gyroscopes" in undone
 
 
 @pytest.mark.thorough

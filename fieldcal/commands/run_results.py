@@ -52,12 +52,15 @@ def solve_and_decide(
     """
     from fieldcal.acceptance.assessment import assess, store_in_history
     from fieldcal.commands.install_values import add_install_values
+    from fieldcal.evaluation.repaired_session import repaired_session, with_repairs
     from fieldcal.evaluation.solution import solve_session
     from fieldcal.evaluation.usable_windows import usable_windows
     from fieldcal.session.folder import RESULT
 
+    session, repaired = repaired_session(session)
     still = usable_windows(session)
-    found = add_install_values(solve_session(session, still, method=method), session)
+    found = with_repairs(solve_session(session, still, method=method), repaired)
+    found = add_install_values(found, session)
     found = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
     if said := store_in_history(history, session, found):

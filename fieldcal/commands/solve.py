@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
 def _solve_and_decide(args: argparse.Namespace, session: Session) -> Calibration:
     """Calibration of a session with what the options ask for, and its decision."""
     from fieldcal.commands.install_values import add_install_values
-    from fieldcal.evaluation.repaired_session import repaired_session
+    from fieldcal.evaluation.repaired_session import repaired_session, with_repairs
     from fieldcal.evaluation.usable_windows import usable_windows
 
     repaired: tuple[str, ...] = ()
@@ -124,7 +124,7 @@ def _solve_and_decide(args: argparse.Namespace, session: Session) -> Calibration
         session, repaired = repaired_session(session)
     still = usable_windows(session)
     found = _solve_session(args, session, still)
-    found = replace(found, warnings=(*repaired, *found.warnings))
+    found = with_repairs(found, repaired)
     found = add_install_values(found, session)
     over_time = _solve_over_time(session) if args.over_time else None
     if over_time is not None:

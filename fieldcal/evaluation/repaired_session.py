@@ -6,8 +6,10 @@ windows are judged and averaged.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from fieldcal.calibration import Calibration
 from fieldcal.diagnosis.signal.chain import repair_samples
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain
@@ -30,3 +32,8 @@ def repaired_session(session: Session) -> tuple[Session, tuple[str, ...]]:
         if isinstance(effect := effects[name], Chain)
     )
     return right, tuple(said)
+
+
+def with_repairs(calibration: Calibration, repaired: Sequence[str]) -> Calibration:
+    """The calibration of corrected samples, which says first what was undone."""
+    return replace(calibration, warnings=(*repaired, *calibration.warnings))

@@ -21,7 +21,7 @@ from fieldcal.core.errors import FieldcalError
 from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.evaluation.prepared_session import PreparedSession
-from fieldcal.evaluation.repaired_session import repaired_session
+from fieldcal.evaluation.repaired_session import repaired_session, with_repairs
 from fieldcal.evaluation.solution import solve_prepared
 from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.fleet.reduced import reduce_session
@@ -91,7 +91,7 @@ class SessionTask:
         still = usable_windows(session)
         prepared = PreparedSession(session, still)
         found = solve_prepared(prepared)
-        found = replace(found, warnings=(*repaired, *found.warnings))
+        found = with_repairs(found, repaired)
         given = Path(self.limits) if self.limits else None
         bounds = limits.read(session.grade, limits_path(session, given))
         if given is None and "run" not in session.about.raw:

@@ -9,6 +9,7 @@ from typing import Any
 
 from fieldcal.calibration import Calibration, limits
 from fieldcal.drivers.driver import Driver
+from fieldcal.evaluation.repaired_session import repaired_session, with_repairs
 from fieldcal.evaluation.solution import solve_session
 from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.run import plan_file
@@ -63,5 +64,6 @@ def recalibrate(
         bounds = limits.read(task.about.grade)
         running = SessionRun(task, operator, recorder, once, bounds, 0.0, GIVE_UP)
         found = running.run(driver)
-    session = Session.open(folder)
-    return solve_session(session, usable_windows(session), method=found.method)
+    session, repaired = repaired_session(Session.open(folder))
+    solved = solve_session(session, usable_windows(session), method=found.method)
+    return with_repairs(solved, repaired)

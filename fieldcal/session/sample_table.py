@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 def block_from_columns(columns: dict[str, Array]) -> Block:
-    """Samples from columns; `columns` is emptied."""
+    """Samples from columns, each in one piece in memory; `columns` is emptied."""
     unknown = np.full(len(columns["t"]), np.nan)
     triad = {
-        kind: np.column_stack([columns.pop(kind + axis, unknown) for axis in "xyz"])
+        kind: np.stack([columns.pop(kind + axis, unknown) for axis in "xyz"]).T
         for kind in "ag"
     }
     rest = [columns.get(n, unknown) for n in ("temperature", "seq", "t_host")]

@@ -24,7 +24,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import fftconvolve
 
 from fieldcal.core.samples import Array
 
@@ -136,7 +135,9 @@ def autocovariance(added: Sequence[Array], lags: int) -> Array:
     """Mean products of samples 0 to `lags` apart, (lags + 1, k)."""
     total = np.zeros((lags + 1, added[0].shape[1]))
     for e in added:
-        both = fftconvolve(e, e[::-1], axes=0)[len(e) - 1 :][: lags + 1]
-        total[: len(both)] += both
+        # that of its power spectrum; zeros behind it keep its end from its beginning
+        size = 1 << (len(e) + lags).bit_length()
+        power = np.abs(np.fft.rfft(e, size, axis=0)) ** 2
+        total += np.fft.irfft(power, size, axis=0)[: lags + 1]
     out: Array = total / sum(len(e) for e in added)
     return out

@@ -168,15 +168,15 @@ class DecodeFault(Chain):
 
 def _put_back(recording: CheckedSamples, first: int) -> list[Fault | None]:
     """Faults of a sensor's three channels with samples that are off by one size."""
-    of = slice(first, first + 3)
-    six, t = recording.block.six, recording.block.t
-    torn = torn_values(six[:, of], recording.still, recording.steps[of])
+    block = recording.block
+    triad, t = block.gyr if first else block.acc, block.t
+    torn = torn_values(triad, recording.still, recording.steps[first : first + 3])
     out: list[Fault | None] = [None, None, None]
     if torn is None:
         return out
     for axis in np.flatnonzero(torn.off.any(axis=0)):
         c = first + int(axis)
-        rows, mended = np.flatnonzero(torn.off[:, axis]), six.copy()
+        rows, mended = np.flatnonzero(torn.off[:, axis]), block.six
         mended[:, c] -= torn.off[:, axis]
         out[axis] = Fault(
             channel=CHANNELS[c],

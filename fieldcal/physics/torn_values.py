@@ -17,10 +17,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.probability import MAD_TO_SIGMA
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index, Mask
 
 ABOUT = 2
 """Samples to either side of one whose median it is compared with."""
@@ -35,6 +34,9 @@ another: of two wrong samples in turn, the median is one."""
 
 FINEST = 128
 """Steps of the grid of an output in such a size, at least."""
+
+SAMPLES_AT_ONCE = 1 << 14
+"""Samples whose departures are computed together: they stay in the cache."""
 
 
 class TornValues(NamedTuple):
@@ -51,9 +53,7 @@ class TornValues(NamedTuple):
     off: Array
 
 
-def torn_values(
-    triad: Array, still: NDArray[np.bool_], steps: Array
-) -> TornValues | None:
+def torn_values(triad: Array, still: Mask, steps: Array) -> TornValues | None:
     """Samples (n, 3) that are off by one size while the device is still; None if none.
 
     Parameters
@@ -65,35 +65,74 @@ def torn_values(
     """
     if len(triad) <= 2 * ABOUT:
         return None
-    apart = np.zeros_like(triad)
-    apart[1:-1] = np.abs(triad[1:-1] - (triad[:-2] + triad[2:]) / 2)
-    apart[~still | ~np.isfinite(apart).all(axis=1)] = 0.0
-    # this is of a median with four others as well, to a tenth
-    noise = MAD_TO_SIGMA * np.array([_median_of_nonzero(axis) for axis in apart.T])
-    departs = np.zeros_like(triad)
-    for axis in range(3):
+    known = _known(triad, still)
+    found = [_Departures.of(axis, known) for axis in triad.T]
+    many = [len(axis.rows) for axis in found]
+    if sum(many) < FEWEST:
+        return None
+    departs = np.concatenate([axis.sizes for axis in found])
+    noise = np.array([axis.noise for axis in found])
+    size = float(np.median(np.abs(departs)))
+    alike = np.abs(np.abs(departs) - size) < AS_LARGE * np.repeat(noise, many)
+    far = np.array(many) > 0
+    clear = size > (BEYOND_NOISE + AS_LARGE) * noise[far].max()
+    if not clear or size < FINEST * steps[far].max():
+        return None
+    if alike.sum() < FEWEST or alike.sum() < (1 - MOST_OTHERS) * len(departs):
+        return None
+    rows = np.concatenate([axis.rows for axis in found])[alike]
+    up, hit = (departs > 0)[alike], len(np.unique(rows))
+    if up.all() or not up.any() or alike.sum() > (1 + MOST_OTHERS) * hit:
+        return None
+    off = np.zeros_like(triad)
+    off[rows, np.repeat(np.arange(3), many)[alike]] = np.where(up, size, -size)
+    return TornValues(size, off)
+
+
+class _Departures(NamedTuple):
+    """Departures of single samples of an output from those about them.
+
+    Attributes
+    ----------
+    rows, sizes : (k,) samples that depart further than by noise, and by how much
+    noise : s
+
+    """
+
+    rows: Index
+    sizes: Array
+    noise: float
+
+    @classmethod
+    def of(cls, values: Array, known: Mask) -> _Departures:
+        """Those of the samples (n,) of which something is known."""
+        apart = np.zeros_like(values)
+        for first in range(1, len(values) - 1, SAMPLES_AT_ONCE):
+            last = min(first + SAMPLES_AT_ONCE, len(values) - 1)
+            mean = (values[first - 1 : last - 1] + values[first + 1 : last + 1]) / 2
+            np.abs(values[first:last] - mean, out=apart[first:last])
+        apart[~known] = 0.0
+        # this is of a median with four others as well, to a tenth
+        noise = MAD_TO_SIGMA * _median_of_nonzero(apart)
         # beside a sample that is off, half of it is seen
-        rows = np.flatnonzero(apart[:, axis] > BEYOND_NOISE / 2 * noise[axis])
-        rows = rows[(rows >= ABOUT) & (rows < len(triad) - ABOUT)]
-        near = triad[np.add.outer(rows, np.arange(-ABOUT, ABOUT + 1)), axis]
-        departs[rows, axis] = np.nan_to_num(near[:, ABOUT] - np.median(near, axis=1))
-    far = np.abs(departs) > BEYOND_NOISE * noise
-    if far.sum() < FEWEST:
-        return None
-    size = float(np.median(np.abs(departs[far])))
-    alike = far & (np.abs(np.abs(departs) - size) < AS_LARGE * noise)
-    clear = size > (BEYOND_NOISE + AS_LARGE) * noise[far.any(axis=0)].max()
-    if not clear or size < FINEST * steps[far.any(axis=0)].max():
-        return None
-    if alike.sum() < FEWEST or alike.sum() < (1 - MOST_OTHERS) * far.sum():
-        return None
-    up, hit = (departs > 0)[alike], alike.any(axis=1)
-    if up.all() or not up.any() or alike.sum() > (1 + MOST_OTHERS) * hit.sum():
-        return None
-    return TornValues(size, np.where(alike, np.sign(departs) * size, 0.0))
+        rows = np.flatnonzero(apart > BEYOND_NOISE / 2 * noise)
+        rows = rows[(rows >= ABOUT) & (rows < len(values) - ABOUT)]
+        near = values[np.add.outer(rows, np.arange(-ABOUT, ABOUT + 1))]
+        sizes = np.nan_to_num(near[:, ABOUT] - np.median(near, axis=1))
+        far = np.abs(sizes) > BEYOND_NOISE * noise
+        return cls(rows[far], sizes[far], noise)
+
+
+def _known(triad: Array, still: Mask) -> Mask:
+    """Samples at rest that are known on all axes, and those beside them, (n,)."""
+    whole: Mask = np.all(np.isfinite(triad), axis=1)
+    known = still & whole
+    known[1:] &= whole[:-1]
+    known[:-1] &= whole[1:]
+    return known
 
 
 def _median_of_nonzero(sizes: Array) -> float:
     """Median of what differs from zero; 0 of nothing."""
     known = sizes[sizes > 0]
-    return float(np.median(known)) if len(known) else 0.0
+    return float(np.median(known, overwrite_input=True)) if len(known) else 0.0

@@ -137,7 +137,7 @@ def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list
     noise = _noise(recording, steps)
     z = recording.six(first, last)
     z /= noise
-    flat = z.copy()
+    flat = z.copy(order="F")  # each channel in one piece
     _flatten(flat, rate)
     if (furthest := _most_disturbed_stretch(flat, rate, shortest)) != NOTHING:
         _flatten(z, rate, furthest)
@@ -176,7 +176,8 @@ def _most_disturbed_stretch(z: Array, rate: float, m: int) -> slice:
     width = max(min(4 * m, len(z) // 4), 1)
     mean = np.zeros(len(z) - width + 1)
     for column in z.T:
-        np.maximum(mean, running_means(np.nan_to_num(column), width), out=mean)
+        (own,) = running_means(np.nan_to_num(column), [width])
+        np.maximum(mean, own, out=mean)
     at, long = int(np.argmax(mean)), min(round(USUAL_PUSH_S * rate), len(z) // 4)
     first = at - (long - width) // 2
     # at the ends nothing on the other side tells the course
@@ -256,15 +257,15 @@ def _deviation_from_parts(column: Array, centre: Array, level: Array) -> Array:
     nearer: what drifts goes on, and what sways turns back.
     """
     rows = np.arange(len(column))
-    stays: Array = column - np.interp(rows, centre, level)
+    out: Array = column - np.interp(rows, centre, level)
     if len(centre) == 1:
-        return stays
-    goes = stays.copy()
+        return out
     ends = (slice(0, int(centre[0]) + 1), 0), (slice(int(centre[-1]), len(column)), -2)
     for side, at in ends:
         slope = (level[at + 1] - level[at]) / (centre[at + 1] - centre[at])
-        goes[side] = column[side] - level[at] - slope * (rows[side] - centre[at])
-    return np.where(np.abs(goes) < np.abs(stays), goes, stays)
+        goes = column[side] - level[at] - slope * (rows[side] - centre[at])
+        out[side] = np.where(np.abs(goes) < np.abs(out[side]), goes, out[side])
+    return out
 
 
 def _fault(

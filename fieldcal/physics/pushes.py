@@ -14,7 +14,7 @@ Source: model of this project.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,9 +74,9 @@ class UsualSpread:
         )
         means = {width: np.ones(z.shape[1]) for width in _widths(len(z), m)}
         for c, column in enumerate(z.T):
-            one = column / (sample[c] * tail[c])
-            for width, spread in means.items():
-                spread[c] = _usual_mean(running_means(one, width), width)
+            one = running_means(column / (sample[c] * tail[c]), list(means))
+            for (width, spread), mean in zip(means.items(), one, strict=True):
+                spread[c] = _usual_mean(mean, width)
         return cls(sample, tail, means)
 
     def no_less_than(self, z: Array, m: int) -> UsualSpread:
@@ -111,12 +111,17 @@ def disturbed_stretches(
         np.maximum(size, np.abs(column) / one, out=size)
     loud = size > LOUD_SAMPLE_SIGMAS
     alone = _isolated_outliers(size)
-    for width in _widths(len(z), m):
-        peak = np.zeros(len(z) - width + 1)
-        for c, column in enumerate(z.T):
-            # a byte decoded wrongly is no push: without it, what of the mean is left
-            mean = running_means(np.where(alone, 0.0, column / scale[c]), width)
-            np.maximum(peak, mean / there.means[width][c], out=peak)
+    widths = _widths(len(z), m)
+    peaks = [np.zeros(len(z) - width + 1) for width in widths]
+    for c, column in enumerate(z.T):
+        usual = column / scale[c]
+        # a byte decoded wrongly is no push: without it, what of the mean is left
+        usual[alone] = 0.0
+        means = running_means(usual, widths)
+        for width, peak, mean in zip(widths, peaks, means, strict=True):
+            mean /= there.means[width][c]
+            np.maximum(peak, mean, out=peak)
+    for width, peak in zip(widths, peaks, strict=True):
         for first, last in runs_of_true(peak > LOUD_MEAN_SIGMAS):
             at = first + int(np.argmax(peak[first:last]))
             loud[at : at + width] = True
@@ -140,18 +145,32 @@ def _isolated_outliers(size: Array) -> NDArray[np.bool_]:
     return alone
 
 
-def running_means(column: Array, width: int) -> Array:
-    """Means over `width` samples, in those of noise, (n - width + 1,)."""
-    total = np.concatenate([[0.0], np.cumsum(column)])
-    mean: Array = np.abs(total[width:] - total[:-width]) / np.sqrt(width)
-    return mean
+def running_means(column: Array, widths: Sequence[int]) -> Iterator[Array]:
+    """Means over so many samples, in those of noise, (n - width + 1,) of each width.
+
+    >>> [mean.tolist() for mean in running_means(np.array([1.0, 3.0, -5.0]), (1, 2))]
+    [[1.0, 3.0, 5.0], [2.82842712474619, 1.414213562373095]]
+    """
+    total = np.zeros(len(column) + 1)
+    np.cumsum(column, out=total[1:])
+    for width in widths:
+        mean: Array = total[width:] - total[:-width]
+        np.abs(mean, out=mean)
+        mean /= np.sqrt(width)
+        yield mean
 
 
 def _usual_mean(mean: Array, width: int) -> float:
-    """Spread of means over `width` samples, without the largest one."""
+    """Spread of means over `width` samples, without those around the largest one."""
     at = int(np.argmax(mean))
-    rest = np.delete(mean, slice(max(at - width + 1, 0), at + width))
-    return float(usual_spread(rest[:, None])[0]) if len(rest) >= width else np.inf
+    first, last = max(at - width + 1, 0), min(at + width, len(mean))
+    left = len(mean) - (last - first)
+    if left < width:
+        return np.inf
+    step = _thinned(left)
+    # every so many of those that are left, counted across what is left out
+    some = np.concatenate([mean[:first:step], mean[last + -first % step :: step]])
+    return float(_middle_half(some[None])[0])
 
 
 def usual_spread(z: Array) -> Array:
@@ -160,8 +179,17 @@ def usual_spread(z: Array) -> Array:
     >>> usual_spread(np.array([[0.0], [3.0], [-3.0], [3.0], [-3.0], [90.0]])).round(2)
     array([4.45])
     """
-    some = np.abs(z[:: max(len(z) // MAX_SPREAD_VALUES, 1)].T, order="C")
-    spread: Array = MAD_TO_SIGMA * np.median(some, axis=1)
+    return _middle_half(np.abs(z[:: _thinned(len(z))].T, order="C"))
+
+
+def _thinned(size: int) -> int:
+    """Values of so many of which one is looked at."""
+    return max(size // MAX_SPREAD_VALUES, 1)
+
+
+def _middle_half(sizes: Array) -> Array:
+    """Spread by the middle half of values without sign, of each row, at least 1."""
+    spread: Array = MAD_TO_SIGMA * np.median(sizes, axis=1)
     return np.maximum(spread, 1.0)
 
 
@@ -178,7 +206,7 @@ def _tails(z: Array, spread: Array) -> Array:
     >>> _tails(z, np.array([1.0, 1.1])).round(1)
     array([1.6, 3.6])
     """
-    some = np.abs(z[:: max(len(z) // MAX_SPREAD_VALUES, 1)].T, order="C")
+    some = np.abs(z[:: _thinned(len(z))].T, order="C")
     parts = np.array_split(some, 3, axis=1)
     told = [np.quantile(part, TAIL_QUANTILES, axis=1) for part in parts]
     inner, outer = np.stack(told, axis=1)

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.pushes import UsualSpread, disturbed_stretches
+from fieldcal.physics import pushes
+from fieldcal.physics.pushes import (
+    UsualSpread,
+    disturbed_stretches,
+    running_means,
+    usual_spread,
+)
 
 M = 10
 
@@ -59,3 +65,19 @@ def test_a_part_is_judged_by_what_is_usual_in_the_whole() -> None:
     assert abs(found[0, 0] - 50) <= 24 and abs(found[-1, 1] - 150) <= 24
     assert np.diff(found, axis=1).sum() > 60
     assert len(disturbed_stretches(part, M)) == 0
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_spread_of_means_is_that_of_those_away_from_the_largest(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(seed)
+    monkeypatch.setattr(pushes, "MAX_SPREAD_VALUES", 50)
+    width, z = int(rng.integers(2, 40)), 3.0 * rng.standard_normal((300, 1))
+    z[rng.integers(300)] += 50.0
+    (mean,) = running_means(z[:, 0], [width])
+    slow = [abs(z[i : i + width].sum()) / width**0.5 for i in range(301 - width)]
+    assert mean == pytest.approx(np.array(slow))
+    at = int(np.argmax(mean))
+    rest = np.delete(mean, slice(max(at - width + 1, 0), at + width))
+    assert pushes._usual_mean(mean, width) == usual_spread(rest[:, None])

@@ -30,6 +30,7 @@ from fieldcal.windows.interleaving import (
     PERIODS,
     PIECES,
     OnePlace,
+    RestOutputs,
     one_place_of_period,
 )
 
@@ -88,14 +89,15 @@ def _found_between(block: Block, ends: tuple[tuple[int, int], ...]) -> OnePlace 
     parts = [part for a, b in ends if _has_force(part := block[a:b])]
     if not parts:
         return None
-    found = {k: [one_place_of_period(part.six, k) for part in parts] for k in PERIODS}
+    rests = [RestOutputs.of(part.six) for part in parts]
+    found = {k: [one_place_of_period(rest, k) for rest in rests] for k in PERIODS}
     period = max(PERIODS, key=lambda k: _surprise(found[k], k))
     pairs = zip(found[period], parts, strict=True)
     known = [(one, part) for one, part in pairs if one is not None and one.steady]
     if 2 * len(known) <= len(parts):
         return None
     places = [one for one, _ in known]
-    steps = np.min([_steps(part.six[:MOST_SAMPLES]) for _, part in known], axis=0)
+    steps = np.min([_steps(part[:MOST_SAMPLES].six) for _, part in known], axis=0)
     if np.count_nonzero(_differ(places, steps, period)) < LEAST_OUTPUTS:
         return None
     force = np.array([np.nanmean(part.acc, axis=0) for _, part in known])

@@ -19,11 +19,12 @@ largest explains less than `LEAST_OF_ONE_PLACE` from k = 4 on.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 
 PERIODS = range(2, 11)
 """Periods that are tried, in samples: rates of two devices differ tenfold at most."""
@@ -76,28 +77,52 @@ class OnePlace(NamedTuple):
         return np.asarray(np.clip(self.size / self.error, -MOST_T, MOST_T))
 
 
-def one_place_of_period(six: Array, period: int) -> OnePlace | None:
-    """The place of a period that differs most; None for too few samples.
+@dataclass(frozen=True, slots=True)
+class RestOutputs:
+    """The outputs that have values in a window at rest, at most `MOST_SAMPLES`.
 
-    Parameters
+    Attributes
     ----------
-    six : consecutive samples at rest, (n, 6) m/s^2 and rad/s; nan where there is none
-    period : k, samples
+    live : (k,) indices of the outputs
+    apart : samples less their means, (n, k) m/s^2 and rad/s
+    sums : of the first of them, none to all, (n + 1, k)
+    least : least error of each output, (k,)
 
     """
-    live = np.flatnonzero(2 * np.isfinite(six).sum(axis=0) > len(six))
-    x = six[:MOST_SAMPLES, live]
-    x = x[np.isfinite(x).all(axis=1)]
-    if len(x) < period * (OTHER_PIECES + 1) or not len(live):
+
+    live: Index
+    apart: Array
+    sums: Array
+    least: Array
+
+    @classmethod
+    def of(cls, six: Array) -> RestOutputs:
+        """Of consecutive samples at rest, (n, 6); nan where there is none."""
+        live = np.flatnonzero(2 * np.isfinite(six).sum(axis=0) > len(six))
+        x = six[:MOST_SAMPLES, live]
+        if not (known := np.isfinite(x).all(axis=1)).all():
+            x = x[known]
+        if not x.size:
+            return cls(live[:0], x, x, np.zeros(0))
+        apart = np.asfortranarray(x - x.mean(axis=0))
+        sums = np.zeros((len(x) + 1, len(live)), order="F")
+        np.cumsum(apart, axis=0, out=sums[1:])
+        least = np.maximum(np.finfo(float).eps * np.abs(x).max(axis=0), LEAST_ERROR)
+        return cls(live, apart, sums, least)
+
+
+def one_place_of_period(rest: RestOutputs, period: int) -> OnePlace | None:
+    """The place of a period of k samples that differs most; None for too few."""
+    live, least = rest.live, rest.least
+    if len(rest.apart) < period * (OTHER_PIECES + 1) or not len(live):
         return None
-    y = _less_moving_mean(x, period)
+    y = _less_moving_mean(rest, period)
     places, others = (_by_place(y, period, n) for n in (PIECES, OTHER_PIECES))
     mean = places.mean(axis=0)
     error = np.maximum(
         places.std(axis=0, ddof=1) / np.sqrt(PIECES),
         others.std(axis=0, ddof=1) / np.sqrt(OTHER_PIECES),
     )
-    least = np.maximum(np.finfo(float).eps * np.abs(x).max(axis=0), LEAST_ERROR)
     # in units of one error for all: where the order varies, places have their own
     square = mean**2 / np.maximum((error**2).mean(axis=0), least**2)
     square = square.sum(axis=1)
@@ -118,14 +143,14 @@ def _by_place(y: Array, period: int, pieces: int) -> Array:
     return np.asarray(parts.mean(axis=1) * period / (period - 1))  # (1)
 
 
-def _less_moving_mean(x: Array, period: int) -> Array:
+def _less_moving_mean(rest: RestOutputs, period: int) -> Array:
     """Samples less the mean over a period about each, (n - period, outputs)."""
-    sums = np.vstack([np.zeros(x.shape[1]), np.cumsum(x - x.mean(axis=0), axis=0)])
-    means = (sums[period:] - sums[:-period]) / period
-    if period % 2:
-        return np.asarray((x - x.mean(axis=0))[period // 2 :][: len(means)] - means)
-    middle = (means[1:] + means[:-1]) / 2
-    return np.asarray((x - x.mean(axis=0))[period // 2 :][: len(middle)] - middle)
+    mean = rest.sums[period:] - rest.sums[:-period]
+    mean /= period
+    if not period % 2:
+        mean = (mean[1:] + mean[:-1]) / 2
+    out: Array = rest.apart[period // 2 :][: len(mean)] - mean
+    return out
 
 
 def _is_of_one_place(square: Array) -> bool:

@@ -5,7 +5,12 @@ import pytest
 from scipy.signal import lfilter
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.interleaving import PERIODS, one_place_of_period
+from fieldcal.windows.interleaving import (
+    PERIODS,
+    OnePlace,
+    RestOutputs,
+    one_place_of_period,
+)
 
 N = 2000
 NOISE = np.array([0.02, 0.03, 0.02, 1e-3, 1e-3, 2e-3])
@@ -19,6 +24,10 @@ def noise(seed: int, n: int = N) -> Array:
     return np.asarray(NOISE * rng.standard_normal((n, 6)) + [0, -9.6, 0.3, 0, 0.1, 0])
 
 
+def place_in(six: Array, period: int) -> OnePlace | None:
+    return one_place_of_period(RestOutputs.of(six), period)
+
+
 def every(k: int, late: int = 0) -> Array:
     return np.asarray(np.arange(N) % k == late, float)[:, None]
 
@@ -27,7 +36,7 @@ def every(k: int, late: int = 0) -> Array:
 def test_a_difference_below_the_noise_is_measured_with_its_error(k: int) -> None:
     pulls = []
     for seed in range(60):
-        found = one_place_of_period(noise(seed) + every(k, seed % k) * 2 * APART, k)
+        found = place_in(noise(seed) + every(k, seed % k) * 2 * APART, k)
         assert found is not None and found.steady
         sign = np.sign(found.size @ APART) if k == 2 else 1.0
         pulls.append((sign * found.size - 2 * APART) / found.error)
@@ -37,9 +46,7 @@ def test_a_difference_below_the_noise_is_measured_with_its_error(k: int) -> None
 
 def test_the_error_is_that_of_the_difference_of_two_means() -> None:
     for k in (2, 5):
-        found = [
-            one_place_of_period(noise(seed) + every(k) * APART, k) for seed in (1, 2)
-        ]
+        found = [place_in(noise(seed) + every(k) * APART, k) for seed in (1, 2)]
         expected = NOISE * np.sqrt(k / (1 - 1 / k) / N)
         for one in found:
             assert one is not None
@@ -51,7 +58,7 @@ def test_samples_in_the_wrong_order_now_and_then_leave_most_of_it() -> None:
     order = np.arange(N)
     at = np.flatnonzero(rng.random(N // 2) < 0.2) * 2
     order[at], order[at + 1] = order[at + 1], order[at].copy()
-    found = one_place_of_period((noise(3) + every(2) * 3 * APART)[order], 2)
+    found = place_in((noise(3) + every(2) * 3 * APART)[order], 2)
     assert found is not None and found.steady
     assert np.abs(found.size[0]) == pytest.approx(3 * 0.6 * APART[0], rel=0.15)
 
@@ -80,7 +87,7 @@ SINGLE = {
 @pytest.mark.parametrize("what", SINGLE)
 def test_one_device_has_no_such_place(what: str) -> None:
     for k in PERIODS:
-        found = one_place_of_period(SINGLE[what], k)
+        found = place_in(SINGLE[what], k)
         assert found is not None
         assert not found.steady or np.abs(found.t).max() < CLEAR, k
 
@@ -88,16 +95,16 @@ def test_one_device_has_no_such_place(what: str) -> None:
 def test_a_course_through_all_places_is_none_of_one_place() -> None:
     """A line of an eighth of the rate, which is steady."""
     line = np.cos(np.pi / 4 * T) * NOISE * 3
-    found = one_place_of_period(noise(11) + line, 8)
+    found = place_in(noise(11) + line, 8)
     assert found is not None and (found.size == 0).all() and (found.t == 0).all()
-    there = one_place_of_period(noise(11) + every(8) * NOISE * 3, 8)
+    there = place_in(noise(11) + every(8) * NOISE * 3, 8)
     assert there is not None and np.abs(there.t).min() > CLEAR
 
 
 def test_a_hum_that_runs_on_is_not_steady() -> None:
     """Of a half of the rate less 1/8 of a turn in the window."""
     hum = np.cos(np.pi * (1 - 0.25 / N) * T + 1.2) * NOISE * 2
-    found = one_place_of_period(noise(12) + hum, 2)
+    found = place_in(noise(12) + hum, 2)
     assert found is not None and not found.steady
 
 
@@ -106,12 +113,12 @@ def test_outputs_without_values_and_windows_without_samples() -> None:
     six[:, 3:] = np.nan
     six[::100] = np.nan
     six[1::100] = np.nan
-    found = one_place_of_period(six, 2)
+    found = place_in(six, 2)
     assert found is not None
     assert (found.t[3:] == 0).all() and np.abs(found.t[:3]).min() > CLEAR
     for few in (0, 1, 45):
-        assert one_place_of_period(six[:few], 2) is None
-    assert one_place_of_period(np.full((N, 6), np.nan), 2) is None
+        assert place_in(six[:few], 2) is None
+    assert place_in(np.full((N, 6), np.nan), 2) is None
 
 
 def test_a_hum_that_turns_by_whole_periods_from_piece_to_piece_is_seen_as_one() -> None:
@@ -119,6 +126,6 @@ def test_a_hum_that_turns_by_whole_periods_from_piece_to_piece_is_seen_as_one() 
     length = N // (3 * 24) * 3  # of a piece of places of 3
     for turns in (3, 5):
         hum = np.cos(2 * np.pi * (1 / 3 + turns / length) * T + 0.4) * NOISE * 1000
-        found = one_place_of_period(noise(14) + hum, 3)
+        found = place_in(noise(14) + hum, 3)
         assert found is not None
         assert not found.steady or np.abs(found.t).max() < CLEAR

@@ -22,6 +22,7 @@ from fieldcal.physics.recording import (
     Grids,
     grids_of,
     lsb_of,
+    shown_in,
     shown_values,
     step_between,
 )
@@ -34,8 +35,8 @@ PIECES = (48, 12)
 of few samples a longer one."""
 
 MANY_VALUES = 0.7
-"""Values of a piece, of its samples, from which it lies on no coarse grid: few come
-again."""
+"""Values of a piece, of its samples that are looked at, from which it lies on no coarse
+grid: few come again."""
 
 FEW_VALUES = 0.1
 """Values of a rest on a coarse grid, of its samples, at most: two or three in turn."""
@@ -167,8 +168,8 @@ def _shown_grids(
     The last is the distance from the phase, in steps, up to which the grid is sure.
     """
     for piece in pieces:
-        shown = shown_values(piece)
-        if not 1 < len(shown) < MANY_VALUES * len(piece):
+        shown, known = shown_values(piece), np.isfinite(piece).sum()
+        if not 1 < len(shown) < MANY_VALUES * len(piece) / shown_in(int(known)):
             continue
         few = len(shown) <= MIN_GRID_GAPS
         # some values may be grid points by chance, but do not come again and again

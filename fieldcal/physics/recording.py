@@ -23,6 +23,10 @@ certain: what a device counts and a program writes in decimals has no two neighb
 Any gap is within 5 % of a whole number by chance once in ten times."""
 
 
+FEW_GAPS = 100
+"""Gaps that are looked at before all others."""
+
+
 @dataclass(frozen=True, slots=True)
 class Grids:
     """Steps of the grids of six outputs, by stretch.
@@ -190,7 +194,12 @@ def lsb_of(values: Array) -> float:
 def shown_values(values: Array) -> Array:
     """Values that some of the samples (n,) show, each once, in order."""
     some = values[np.isfinite(values)]
-    return np.unique(some[:: max(1, len(some) // GRID_SAMPLES)])
+    return np.unique(some[:: shown_in(len(some))])
+
+
+def shown_in(size: int) -> int:
+    """Samples in each of which one is looked at, of so many."""
+    return max(1, size // GRID_SAMPLES)
 
 
 def step_between(shown: Array) -> float:
@@ -209,14 +218,19 @@ def _grid(gaps: Array, step: float) -> float:
     """Step of which all gaps are multiples, about a first guess; 0 if there is none."""
     total, widest = float(gaps.sum()), float(gaps.max())
     for _ in range(3):  # the grid's own step is the mean over many, not one difference
-        steps = gaps / step
-        whole = np.round(steps)
         most = 0.1 + 0.02 * round(widest / step) ** 0.5
-        if most < 0.5 and np.abs(steps - whole).max() > most:
-            return 0.0
-        step = total / float(whole.sum())
-    off = np.abs(gaps / step - np.round(gaps / step))
-    return step if off.max() < 0.05 else 0.0
+        # of what lies on no grid, the first few gaps tell it
+        for some in (gaps[:FEW_GAPS], gaps) if most < 0.5 else ():
+            if _off_grid(some, step) > most:
+                return 0.0
+        step = total / float(np.round(gaps / step).sum())
+    return step if _off_grid(gaps, step) < 0.05 else 0.0
+
+
+def _off_grid(gaps: Array, step: float) -> float:
+    """Largest distance of gaps from whole steps, in steps."""
+    steps = gaps / step
+    return float(np.abs(steps - np.round(steps)).max())
 
 
 MIN_GRID_VALUES = 4
@@ -236,7 +250,7 @@ def grids_of(block: Block) -> Array:
 
 
 def _grids(triad: Array) -> Array:
-    some = triad[:: max(1, len(triad) // GRID_SAMPLES)]
+    some = triad[:: shown_in(len(triad))]
     shown = [np.unique(axis[np.isfinite(axis)]) for axis in some.T]
     steps = np.array([step_between(values) for values in shown])
     few = np.array([0 < len(values) < MIN_GRID_VALUES for values in shown])

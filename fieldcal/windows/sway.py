@@ -22,7 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.windows.cells import CELL
 from fieldcal.windows.sway_by_force import lean_angles, with_turn_rates
 from fieldcal.windows.sway_process import fit_waves, wave_frequencies, without_waves
@@ -71,19 +71,20 @@ def find_sway(t: Array, six: Array) -> list[SwayWaves]:
 
     """
     channels = six if np.isfinite(six[:, 3:]).any() else six[:, :3]
-    known = np.isfinite(channels).all(axis=1)
-    t, six = t[known], channels[known]
+    known: Mask = np.all(np.isfinite(channels), axis=1)
+    t, six = (t, channels) if known.all() else (t[known], channels[known])
     parts = (
         max(1, int(np.ceil((t[-1] - t[0]) / LONGEST_STRETCH_S))) if len(t) > 1 else 1
     )
     if parts > len(t):  # samples minutes apart, or times in another unit
         return []
-    waves = [
-        _waves_of_stretch(t[some], six[some])
-        for some in np.array_split(np.arange(len(t)), parts)
-    ]
-    out = [wave for wave in waves if wave is not None]
-    return out if len(out) == parts else []
+    out = []
+    for own, some in zip(*(np.array_split(a, parts) for a in (t, six)), strict=True):
+        waves = _waves_of_stretch(own, some)
+        if waves is None:  # what sways does so throughout
+            return []
+        out.append(waves)
+    return out
 
 
 def _waves_of_stretch(t: Array, six: Array) -> SwayWaves | None:

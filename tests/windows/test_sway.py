@@ -226,16 +226,26 @@ def test_a_window_is_divided_from_its_first_sample_to_its_last(
     """One sample more than forty seconds is two stretches, of the samples in order."""
     seen: list[Array] = []
 
-    def stretch(t: Array, six: Array) -> None:
+    def stretch(t: Array, six: Array) -> str:
         np.testing.assert_array_equal(six[:, 4], 3 * t)
         seen.append(t)
+        return "waves"
 
     monkeypatch.setattr(sway, "_waves_of_stretch", stretch)
     t = np.append(np.arange(0.0, seconds - 0.015, 0.02), seconds)
     six = np.outer(t, [1.0, 0.0, 0.0, 0.0, 3.0, 0.0])
-    assert find_sway(t, six) == []
-    assert len(seen) == parts
+    assert len(find_sway(t, six)) == len(seen) == parts
     np.testing.assert_array_equal(np.concatenate(seen), t)
+
+
+def test_one_stretch_that_does_not_sway_is_enough(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answers = ["waves", None, "waves"]
+    monkeypatch.setattr(sway, "_waves_of_stretch", lambda _t, _six: answers.pop(0))
+    t = np.arange(0.0, 110.0, 0.02)
+    assert find_sway(t, np.zeros((len(t), 6))) == []
+    assert answers == ["waves"]
 
 
 def test_cells_are_means_of_whole_tenths_of_a_second() -> None:

@@ -82,11 +82,11 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
         return None
     windows = window_bounds(block, about)
     unit = np.concatenate([about.nominal[n] for n in ("acc_scale", "gyr_scale")])
-    felt = block.with_six(block.six / unit)  # SI, and every axis to its own side
     waves_by_position = {
         p: waves
         for p, (a, b) in enumerate(windows)
-        if b > a and (waves := find_sway(felt.t[a:b], felt[a:b].six))
+        # SI, and every axis to its own side
+        if b > a and (waves := find_sway(block.t[a:b], block[a:b].six / unit))
     }
     swaying = [waves_by_position[p] for p in fixed if p in waves_by_position]
     if len(swaying) < detections.MIN_SWAYING_SHARE * len(fixed):
@@ -109,6 +109,7 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
             left.append(seen * np.repeat([about.gravity**2, 1.0], 3))
     root = np.sqrt(max(len(swaying) - 1, 1))
     noise = [w.noise * w.length for waves in waves_by_position.values() for w in waves]
+    felt = block.with_six(block.six / unit)
     steady = _without_sway(felt, windows, waves_by_position)
     return BaseSway(
         block.with_six(steady * unit), np.array(left) * unit**2,

@@ -62,11 +62,11 @@ def direction_alone_text(held: Sequence[Array], step: float) -> str:
 
     """
     held = [acc for acc in held if len(acc) > ORDER]
-    size = np.linalg.norm(np.vstack([*held, np.zeros((0, 3))]), axis=1)
-    size = size[np.isfinite(size)]
+    sizes = [np.linalg.norm(acc, axis=1) for acc in held]
+    size = np.concatenate([np.zeros(0), *(own[np.isfinite(own)] for own in sizes)])
     if not len(size):
         return ""
-    usual, scatter = float(np.median(size)), float(size.std())
+    scatter, usual = float(size.std()), float(np.median(size, overwrite_input=True))
     rounded = ROUNDED * step / np.sqrt(12)  # (1)
     if not 0 < usual or scatter > max(rounded, EXACT * usual):
         return ""

@@ -199,7 +199,8 @@ def _second_differences(piece: Array, m: int, most: int) -> Array:
     """Second differences of means over m samples; of many, about `most` of them."""
     triples, channels = len(piece) // (3 * m), piece.shape[1]
     if triples > most:
-        selected = piece[: 3 * m * triples].reshape(triples, -1)[:: triples // most]
+        every = piece[: 3 * m * triples].reshape(triples, 3 * m, channels)
+        selected = every[:: triples // most]
         means = _means(selected.reshape(-1, m, channels)).reshape(-1, 3, channels)
         out: Array = np.diff(means, 2, axis=1)[:, 0]
         return out

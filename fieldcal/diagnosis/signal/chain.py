@@ -75,11 +75,12 @@ def check_chain(block: Block, about: Description) -> CheckedRecording:
 
     A session of means only cannot be checked: its rows are different positions.
     """
-    usable = np.isfinite(block.six)
+    six = block.six
+    usable, dead = np.isfinite(six), dead_sensors(six)
+    del six  # an hour of samples need not be in memory once more
     if about.means_only:
         return CheckedRecording(block, usable, (), median_sigma(about.mean_sigma))
     faults: list[tuple[str, Fault]] = []
-    dead = dead_sensors(block.six)
     for sensor in dead:
         # a sensor without any signal is not reported as stuck as well
         usable[:, sensor.channels] &= not sensor.absent

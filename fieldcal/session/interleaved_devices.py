@@ -97,8 +97,11 @@ def _found_between(block: Block, ends: tuple[tuple[int, int], ...]) -> OnePlace 
     if 2 * len(known) <= len(parts):
         return None
     places = [one for one, _ in known]
+    differ = _differ(places, period)
+    if np.count_nonzero(differ) < LEAST_OUTPUTS:
+        return None
     steps = np.min([_steps(part[:MOST_SAMPLES].six) for _, part in known], axis=0)
-    if np.count_nonzero(_differ(places, steps, period)) < LEAST_OUTPUTS:
+    if np.count_nonzero(differ & _exceed_dither(places, steps)) < LEAST_OUTPUTS:
         return None
     force = np.array([np.nanmean(part.acc, axis=0) for _, part in known])
     if not _grow_with_force(places, force, period):
@@ -128,17 +131,19 @@ def _squares(one: OnePlace, period: int) -> Array:
     return np.asarray(ndtri(np.clip(rare, np.finfo(float).tiny, 0.5)) ** 2)
 
 
-def _differ(found: Sequence[OnePlace], steps: Array, period: int) -> Mask:
-    """Which outputs differ beyond chance over all windows, and by more than dither.
-
-    `steps` are those of the outputs, (6,).
-    """
+def _differ(found: Sequence[OnePlace], period: int) -> Mask:
+    """Which outputs differ beyond chance over all windows, (6,)."""
     from scipy.special import chdtri
 
     least = chdtri(len(found), CHANCE / (6 * len(PERIODS)))
+    squares = np.sum([_squares(one, period) for one in found], axis=0)
+    return np.asarray(squares > least)
+
+
+def _exceed_dither(found: Sequence[OnePlace], steps: Array) -> Mask:
+    """Which outputs, with steps (6,), differ by more than dither in some window."""
     clear = [np.abs(one.size) - SURELY * one.error for one in found]
-    beyond = np.sum([_squares(one, period) for one in found], axis=0) > least
-    return np.asarray(beyond & (np.max(clear, axis=0) > LEAST_STEPS * steps))
+    return np.asarray(np.max(clear, axis=0) > LEAST_STEPS * steps)
 
 
 def _steps(six: Array) -> Array:

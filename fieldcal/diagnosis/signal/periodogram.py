@@ -118,10 +118,10 @@ def window_spectrum(pieces: WindowSamples) -> Spectrum:
     total, count = np.zeros((6, n // 2 + 1)), 0
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
         parts = -(-len(samples) // resolutions.PERIODOGRAM_SAMPLES)
-        for part in np.array_split(np.arange(len(t)), parts):
+        split = (np.array_split(a, parts) for a in (samples, t))
+        for part, times in zip(*split, strict=True):
             taper = np.hanning(len(part))
-            tapered = samples[part].T * taper
-            spectrum = _fourier_sums(tapered, t[part], pieces.rate, n)
+            spectrum = _fourier_sums(part.T * taper, times, pieces.rate, n)
             total += _squared_magnitude(spectrum) / (taper @ taper)
             count += 1
     used = np.flatnonzero(total.any(axis=1)).tolist()

@@ -18,20 +18,20 @@ from itertools import groupby
 
 import numpy as np
 
-from fieldcal.core.samples import GYR, Array, Mask
+from fieldcal.core.samples import Array, Block, Mask
 from fieldcal.model import detections, thresholds
 from fieldcal.model.rows.averages import Rows
 from fieldcal.windows.noise import is_to_and_fro, quickest_noise
 
 
-def trembling_windows(rows: Rows, pieces: list[Array], rate: float) -> Mask:
+def trembling_windows(rows: Rows, pieces: list[Block], rate: float) -> Mask:
     """Windows in which a hand moves the device, while it rests in others, (k,).
 
-    `pieces` are the (n_i, 6) samples of each, nan where missing, at `rate` Hz.
+    `pieces` are the samples of each, at `rate` Hz.
     """
     if len(pieces) < detections.MIN_HELD_WINDOWS:
         return np.zeros(len(pieces), dtype=bool)
-    shown = np.array([_relative_tremor(piece[:, GYR], rate) for piece in pieces])
+    shown = np.array([_relative_tremor(piece.gyr, rate) for piece in pieces])
     known = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
     if not known.any():
         return np.zeros(len(pieces), dtype=bool)
@@ -71,27 +71,28 @@ def _high_frequency_noise(rates: Array) -> Array:
     nan for an axis without samples.
     """
     out = np.full(3, np.nan)
-    measured = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
+    known = np.isfinite(rates)
+    measured = (known[4:] & known[3:-1] & known[2:-2] & known[1:-3] & known[:-4]).any(
+        axis=0
+    )
     if measured.any():
         out[measured] = quickest_noise([rates[:, measured]])
     return out
 
 
-def noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | None:
+def noise_beside_tremor(rows: Rows, pieces: list[Block], least: Array) -> Array | None:
     """Noise of one sample without the tremor, (6,); None if there is no tremor.
 
-    `pieces` are the (n_i, 6) samples of windows, `least` (6,) the noise of rounding.
+    `pieces` are the samples of windows, `least` (6,) the noise of rounding.
     """
     free = ~rows.x.oriented.any() and len(pieces) >= detections.MIN_HELD_WINDOWS
-    if not free or not is_to_and_fro([piece[:, GYR] for piece in pieces]):
+    if not free or not is_to_and_fro([piece.gyr for piece in pieces]):
         return None
     # where a hand is quick, differences of samples show it as well
-    each = np.ma.masked_invalid(
-        [_high_frequency_noise(piece[:, GYR]) for piece in pieces]
-    )
+    each = np.ma.masked_invalid([_high_frequency_noise(piece.gyr) for piece in pieces])
     loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
     quiet = np.argsort(loud)[: max(round(detections.QUIET_SHARE * len(pieces)), 1)]
-    return np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
+    return np.fmax(quickest_noise([pieces[i].six for i in quiet]), least)
 
 
 def tremor_rms(values: Array, length: float, white: Array) -> Array:

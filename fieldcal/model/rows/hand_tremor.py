@@ -57,8 +57,7 @@ def rows_of_recording(source: RowSource) -> Rows:
     windows = window_bounds(source.block, source.about)
     bound = windows[held]
     block = masked(source.block, source.usable)
-    six = block.six
-    pieces = [six[a:b] for a, b in bound]
+    pieces = [block[a:b] for a, b in bound]
     angle = force_wander_angle(rows)
     rounded = rounding_noise(block, bound).max(axis=0)
     noise = noise_beside_tremor(rows, pieces, rounded)

@@ -74,7 +74,9 @@ def _scatter(mean: Array, values: Array) -> float:
     0.1
     """
     bend = np.diff(mean, 2)
-    gaps = np.diff(np.unique(values))
+    # a thermometer shows most values many times in turn
+    shown = values[np.append(True, values[1:] != values[:-1])]
+    gaps = np.diff(np.unique(shown))
     grain = float(gaps.min(initial=np.inf)) if len(gaps) else 0.0
     white = float((bend**2).mean()) / 6 if len(bend) else 0.0
     return float(np.sqrt(white + grain**2 / 12))

@@ -194,16 +194,24 @@ def _outlier_samples(recording: CheckedSamples) -> NDArray[np.bool_]:
     """Whether single samples jump by more than the device can move, (n, 6)."""
     n, edge, still = len(recording.block), AROUND + 3, recording.still
     out, moved = np.zeros((n, 6), dtype=bool), np.repeat(MOVED, 3)
+    unlikely = np.repeat(UNLIKELY, 3) * np.abs(recording.scale)
     for first in range(0, n, SAMPLES_AT_ONCE):
         some = slice(max(first - edge, 0), min(first + SAMPLES_AT_ONCE + edge, n))
-        most = np.where(still[some, None], 1.0, moved) * np.repeat(UNLIKELY, 3)
-        found = _outliers_in_block(
-            recording.block[some], most * np.abs(recording.scale)
-        )
+        block = recording.block[some]
+        if _lie_within(block, unlikely / 2):  # no sample is that far from any other
+            continue
+        most = np.where(still[some, None], 1.0, moved) * unlikely
+        found = _outliers_in_block(block, most)
         out[first : first + SAMPLES_AT_ONCE] = found[first - some.start :][
             :SAMPLES_AT_ONCE
         ]
     return out
+
+
+def _lie_within(block: Block, most: Array) -> bool:
+    """Whether all samples of each output are known, and lie within `most`, (6,)."""
+    spread = np.concatenate([np.ptp(triad, axis=0) for triad in (block.acc, block.gyr)])
+    return bool((spread < most).all())
 
 
 def _outliers_in_block(block: Block, most: Array) -> NDArray[np.bool_]:

@@ -69,9 +69,10 @@ class UsualSpread:
     def of(cls, z: Array, m: int) -> UsualSpread:
         """Of outputs (n, c) without slow part; `m` as in `disturbed_stretches`."""
         sample = usual_spread(z)
-        tail = np.where(
-            sample > SHAKEN_RATIO, np.maximum(_tails(z, sample), SHAKEN_TAIL), 1.0
-        )
+        tail, shaken = np.ones(z.shape[1]), sample > SHAKEN_RATIO
+        if shaken.any():
+            far = _tails(z[:, shaken], sample[shaken])
+            tail[shaken] = np.maximum(far, SHAKEN_TAIL)
         means = {width: np.ones(z.shape[1]) for width in _widths(len(z), m)}
         for c, column in enumerate(z.T):
             one = running_means(column / (sample[c] * tail[c]), list(means))

@@ -117,11 +117,17 @@ class CheckedSamples:
 
     def mean(self, position: int) -> Array:
         """Mean of the finite samples in a window, (6,); nan without any."""
-        six = self.six(*self.windows[position].tolist())
-        known = np.isfinite(six)
-        count = known.sum(axis=0)
-        total = np.where(known, six, 0.0).sum(axis=0)
-        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        first, last = self.windows[position].tolist()
+        out = np.full(6, np.nan)
+        for c, values in enumerate((*self.block.acc.T, *self.block.gyr.T)):
+            some = values[first:last]
+            total = some.sum()
+            if not np.isfinite(total):
+                some = some[np.isfinite(some)]
+                total = some.sum()
+            if len(some):
+                out[c] = total / len(some)
+        return out
 
     def position_of(self, row: int) -> int:
         """Index of the position whose window holds a sample, -1 if none does."""

@@ -111,7 +111,7 @@ def _detrended(t: Array, values: Array, usable: Mask, cuts: Array) -> Array:
     first = np.unique(np.append(0, np.searchsorted(t, cuts[cuts < t[-1]])))
     long = np.diff(np.append(first, len(t)))
     s -= np.repeat(np.add.reduceat(s, first) / long, long)
-    out = np.zeros((len(t), 6))
+    out = np.zeros((len(t), 6), order="F")  # each channel in one piece
     for c in range(6):
         known = usable[:, c]
         column = np.where(known, values[:, c], 0.0)

@@ -14,8 +14,6 @@ hand the direction of the force varies beyond their noise, on a table it does no
 
 from __future__ import annotations
 
-from itertools import groupby
-
 import numpy as np
 
 from fieldcal.core.samples import Array, Block, Mask
@@ -53,11 +51,17 @@ def _relative_tremor(rates: Array, rate: float) -> Array:
         return unrest
     many = min(len(rates), max(round(rate), 8))
     white = noise[measured] ** 2 / rate * (many / rate) / 15
-    parts = np.array_split(rates[:, measured], len(rates) // many)
-    nothing = np.zeros(len(white))
+    rates = rates if measured.all() else rates[:, measured]
+    parts = len(rates) // many
+    length, more = divmod(len(rates), parts)  # more of them have a sample more
+    longer = more * (length + 1)
     turned = [
-        tremor_rms(np.stack(list(alike)), length / rate, nothing) ** 2
-        for length, alike in groupby(parts, key=len)
+        tremor_rms(part.reshape(alike, -1, len(white)), n / rate, 0.0 * white) ** 2
+        for part, alike, n in (
+            (rates[:longer], more, length + 1),
+            (rates[longer:], parts - more, length),
+        )
+        if alike
     ]
     # a hand does so all the time, and a bump in a second or two
     usual = np.median(np.concatenate(turned), axis=0)

@@ -87,7 +87,7 @@ def assess(
         temperature_sigma=earlier.family.sigma if earlier.family else {},
         doubts=[
             *insistence_doubts(marks),
-            *broken_axis_messages(session.block.six),
+            *broken_axis_messages(session.block),
             *_bias_faults(calibration, session, windows, limits),
         ],
         windows=windows.at_rest(session).averages,
@@ -177,7 +177,7 @@ def with_faults(
     wrong = [gravity_contradiction(about)] if of_acc else []
     wrong += [
         _undetermined_by_omission(calibration, session, windows, limits),
-        *broken_axis_messages(session.block.six),
+        *broken_axis_messages(session.block),
     ]
     wrong += [bias_jump_warning(calibration, limits)]
     wrong += _bias_faults(calibration, session, windows, limits)

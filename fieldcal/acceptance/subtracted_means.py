@@ -72,10 +72,11 @@ class _Sums:
     def __init__(self, block: Block, axes: Index) -> None:
         self._t, self._period = block.t, sample_period(block)
         known = np.isfinite(block.gyr[:, axes])
-        zero = np.zeros((1, len(axes)))
         rates = np.where(known, block.gyr[:, axes], 0.0)
-        self._sums = np.vstack([zero, rates.cumsum(axis=0)])
-        self._counts = np.vstack([zero, known.cumsum(axis=0)])
+        self._sums = np.zeros((len(block) + 1, len(axes)))
+        np.cumsum(rates, axis=0, out=self._sums[1:])
+        self._counts = np.zeros(self._sums.shape, dtype=np.int32)
+        np.cumsum(known, axis=0, dtype=np.int32, out=self._counts[1:])
 
     def sample_at(self, time: float) -> int:
         """Number of the first sample from an instant on, s."""

@@ -113,7 +113,7 @@ def _is_explained_by_steps(
 ) -> bool:
     """Whether coarse steps of the output explain a run of equal values."""
     if last - first == len(recording.block):
-        dead = dead_sensors(recording.block.six)
+        dead = dead_sensors(recording.block.acc, recording.block.gyr)
         return not any(c in one.axes for one in dead if not one.absent)
     step = float(recording.grids.within(first, last)[c])
     step_of = step / max(float(recording.noise[c]), 1e-300)

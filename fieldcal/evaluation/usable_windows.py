@@ -94,8 +94,10 @@ def usable_windows(session: Session) -> UsableWindows:
     refuse_duplicate_channels(session.block)
     refuse_direction_alone(session.block, session.about.windows)
     refuse_mixed_devices(session.block, session.about.windows)
-    dead, warnings = dead_sensors(session.block.six), list(session.warnings)
-    taken = _average_windows(session, _without_dead_axes(session.block), warnings)
+    dead = dead_sensors(session.block.acc, session.block.gyr)
+    warnings = list(session.warnings)
+    living = without_dead_axes(session.block, dead)
+    taken = _average_windows(session, living, warnings)
     if not taken:
         raise SessionError(
             f"{session.folder}: no window can be used; {warnings[-1]}"
@@ -119,12 +121,6 @@ def _windows_without(
     )
 
 
-def _without_dead_axes(block: Block) -> Block:
-    """The samples with dead axes set to nan."""
-    six = without_dead_axes(block.six)
-    return block.with_six(six)
-
-
 def _average_windows(
     session: Session, block: Block, warnings: list[str]
 ) -> dict[int, Average]:
@@ -138,7 +134,7 @@ def _average_windows(
         block = sways.block
         warnings.append(sways.sentence)
     taken: dict[int, Average] = {}
-    least = converter_noise(block.six)
+    least = converter_noise(block)
     noise: LearnedNoise | None = None
     held = about.in_time_order()
     # each window provides the noise for the next
@@ -228,7 +224,8 @@ def _windows_of_means(session: Session) -> UsableWindows:
             f"{session.folder}: no mean lies in a window of session.toml: give each"
             " [[position]] a start_s and end_s about its mean"
         )
-    dead = dead_sensors(np.array([average.mean for average in averages]))
+    means = np.array([average.mean for average in averages])
+    dead = dead_sensors(means[:, ACC], means[:, GYR])
     return _windows_without(dead, rows, averages, session.warnings)
 
 

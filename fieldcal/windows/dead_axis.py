@@ -6,7 +6,7 @@ sends zeros instead. A force or a turn needs all three axes of its sensor.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +47,7 @@ class DeadSensor(NamedTuple):
         return len(self.axes) == len("xyz")
 
 
-def dead_sensors(six: Array) -> list[DeadSensor]:
+def dead_sensors(acc: Array, gyr: Array) -> list[DeadSensor]:
     """Recorded sensors that have an axis without a signal.
 
     Such an axis is missing, or it never changes while the other axes are noisier than
@@ -56,12 +56,15 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
 
     Parameters
     ----------
-    six : (n, 6) samples in `CHANNELS` order, nan where missing
+    acc, gyr : (n, 3) samples, nan where missing
 
     """
     dead = []
-    for sensor, channels in (("accelerometers", ACC), ("gyroscopes", GYR)):
-        axes = _dead_axes(six[:, channels])
+    for sensor, channels, triad in (
+        ("accelerometers", ACC, acc),
+        ("gyroscopes", GYR, gyr),
+    ):
+        axes = _dead_axes(triad)
         if not axes:
             continue
         names = [CHANNELS[channels][axis] for axis in axes]
@@ -74,22 +77,17 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
     return dead
 
 
-def broken_axis_messages(six: Array) -> list[str]:
+def broken_axis_messages(block: Block) -> list[str]:
     """Sentences about recorded axes that never change while the other axes do.
 
     A missing column may be intended. A value that never changes means that a wire or a
     sensor is broken.
-
-    Parameters
-    ----------
-    six : (n, 6) samples in `CHANNELS` order, nan where missing
-
     """
     messages = []
-    for sensor in dead_sensors(six):
-        stuck = [
-            a for a in sensor.axes if np.isfinite(six[:, a]).any() and not sensor.absent
-        ]
+    outputs = (*block.acc.T, *block.gyr.T)
+    for sensor in dead_sensors(block.acc, block.gyr):
+        shown = [a for a in sensor.axes if np.isfinite(outputs[a]).any()]
+        stuck = [] if sensor.absent else shown
         if not stuck:
             continue
         names = [CHANNELS[a] for a in stuck]
@@ -121,17 +119,17 @@ def _share_of_changes(values: Array) -> float:
     return float(np.mean(known[1:] != known[:-1])) if len(known) > 1 else 0.0
 
 
-def without_dead_axes(six: Array) -> Array:
-    """Samples (n, 6) with nan for axes without a signal.
+def without_dead_axes(block: Block, sensors: Sequence[DeadSensor]) -> Block:
+    """Samples with nan for the axes without a signal; the block itself without any.
 
-    The other axes of the sensor still show whether the device is at rest.
+    The other axes of such a sensor still show whether the device is at rest.
     """
-    dead = [axis for sensor in dead_sensors(six) for axis in sensor.axes]
+    dead = [axis for sensor in sensors for axis in sensor.axes]
     if not dead:
-        return six
-    kept = six.copy()
+        return block
+    kept = block.six
     kept[:, dead] = np.nan
-    return kept
+    return block.with_six(kept)
 
 
 class LiveAxisRows:

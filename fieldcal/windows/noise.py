@@ -35,7 +35,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Block
 from fieldcal.windows import rounding
 from fieldcal.windows.sums import smallest_changes
 
@@ -101,7 +101,7 @@ def measure_noise(pieces: Sequence[Array], rate_hz: float) -> ChannelNoise:
     return ChannelNoise(np.maximum(white, least), quick)
 
 
-def converter_noise(six: Array) -> Array:
+def converter_noise(block: Block) -> Array:
     """Least standard deviation of one sample, (6,), that a converter leaves.
 
     A triad's full scale, which is twice its largest values at least, over 2 to the
@@ -110,11 +110,11 @@ def converter_noise(six: Array) -> Array:
 
     Parameters
     ----------
-    six : samples of a recording, turns included, (n, 6) m/s^2 and rad/s
+    block : samples of a recording, turns included
 
     """
-    some = six[:: max(1, len(six) // MOST_DIFFERENCES)]
-    values = (np.abs(triad[np.isfinite(triad)]) for triad in np.hsplit(some, 2))
+    some = block[:: max(1, len(block) // MOST_DIFFERENCES)]
+    values = (np.abs(triad[np.isfinite(triad)]) for triad in (some.acc, some.gyr))
     # not the very largest, which may be wrong bits
     most = [np.quantile(own, 0.99) if len(own) else 0.0 for own in values]
     return np.repeat(2 * np.array(most) / 2**EFFECTIVE_BITS, 3)

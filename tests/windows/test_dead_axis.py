@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.core.samples import ACC, GYR, Block
+from fieldcal.core.samples import ACC, GYR, Array, Block
 from fieldcal.windows import dead_axis
 from fieldcal.windows.dead_axis import (
+    DeadSensor,
     LiveAxisRows,
     broken_axis_messages,
     dead_sensors,
@@ -15,32 +16,41 @@ from fieldcal.windows.dead_axis import (
 )
 
 
+def block_of(six: Array) -> Block:
+    return Block.of(np.arange(len(six)) / 100.0, six[:, ACC], six[:, GYR])
+
+
+def dead(six: Array) -> list[DeadSensor]:
+    return dead_sensors(six[:, ACC], six[:, GYR])
+
+
 def test_an_axis_that_changes_once_is_not_dead() -> None:
     six = np.zeros((50, 6))
     six[30] = 1e-9
-    assert dead_sensors(six) == []
+    assert dead(six) == []
 
 
 def test_beside_axes_as_coarse_it_may_only_not_be_turned() -> None:
     six = np.round(np.random.default_rng(2).normal(size=(500, 6)) * 0.3)
     six[:, 1] = 0.0
-    assert dead_sensors(six) == []
-    np.testing.assert_array_equal(without_dead_axes(six), six)
+    assert dead(six) == []
 
 
 def test_beside_axes_that_jump_once_it_may_only_not_be_turned() -> None:
     six = np.zeros((50, 6))
     six[10:, [0, 2, 3, 4, 5]] = 1.0
-    assert dead_sensors(six) == []
+    assert dead(six) == []
 
 
 def test_others_of_its_sensor_still_tell_of_rest() -> None:
     six = np.random.default_rng(2).normal(size=(50, 6))
     six[:, 5] = 0.0
-    told = without_dead_axes(six)
+    block = block_of(six)
+    told = without_dead_axes(block, dead(six)).six
     assert np.isnan(told[:, 5]).all()
     np.testing.assert_array_equal(told[:, :5], six[:, :5])
-    assert (six[:, 5] == 0).all()
+    assert (block.gyr[:, 2] == 0).all()
+    assert without_dead_axes(block, []) is block
 
 
 @pytest.mark.parametrize("value", [0.0, 9.81, np.nan])
@@ -48,7 +58,7 @@ def test_a_sensor_goes_with_one_axis(value: float) -> None:
     six = np.random.default_rng(0).normal(size=(50, 6))
     six[:, 2] = value
     six[3, 4] = np.nan
-    (found,) = dead_sensors(six)
+    (found,) = dead(six)
     assert (found.channels, found.absent) == (ACC, False)
     assert found.message.endswith("not used: az never changes, or is missing")
 
@@ -56,7 +66,7 @@ def test_a_sensor_goes_with_one_axis(value: float) -> None:
 def test_a_sensor_that_sends_zeros_is_absent_and_one_not_recorded_is_none() -> None:
     six = np.random.default_rng(0).normal(size=(50, 6))
     six[:, :3], six[:, 3:] = np.nan, 0.0
-    (found,) = dead_sensors(six)
+    (found,) = dead(six)
     assert (found.channels, found.absent) == (GYR, True)
     assert "gx, gy and gz never change, or are missing" in found.message
 
@@ -64,24 +74,24 @@ def test_a_sensor_that_sends_zeros_is_absent_and_one_not_recorded_is_none() -> N
 def test_rows_of_either_sensor_in_turn_are_both_alive() -> None:
     six = np.random.default_rng(3).normal(size=(60, 6))
     six[::2, :3] = six[1::2, 3:] = np.nan
-    assert dead_sensors(six) == []
+    assert dead(six) == []
     six[1::2, 0] = 0.5
-    (found,) = dead_sensors(six)
+    (found,) = dead(six)
     assert found.axes == (0,)
 
 
 def test_an_axis_that_never_changes_beside_others_that_do_is_a_broken_one() -> None:
     six = np.random.default_rng(4).normal(size=(50, 6))
-    assert broken_axis_messages(six) == []
+    assert broken_axis_messages(block_of(six)) == []
     six[:, 1] = 0.3
-    (said,) = broken_axis_messages(six)
+    (said,) = broken_axis_messages(block_of(six))
     assert said.startswith("ay never changes while the rest of the sensor does")
     six[:, 0], six[4, 0] = 0.1, np.nan
-    (said,) = broken_axis_messages(six)
+    (said,) = broken_axis_messages(block_of(six))
     assert said.startswith("ax and ay never change while")
     # a column that is missing was not recorded, and a sensor of zeros is not there
     six[:, :2], six[:, 3:] = np.nan, 0.0
-    assert broken_axis_messages(six) == []
+    assert broken_axis_messages(block_of(six)) == []
 
 
 def test_cells_of_an_axis_that_never_changes_are_as_if_not_recorded() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import ACC, GYR, Array, Block
 from fieldcal.windows import noise
 from fieldcal.windows.noise import (
     is_to_and_fro,
@@ -333,13 +333,17 @@ def test_a_converter_leaves_a_part_of_what_the_triad_measures() -> None:
     """Each triad has its own full scale; wrong words and missing values are none."""
     rng = np.random.default_rng(8)
     six = rng.uniform(-1, 1, (5000, 6)) * [9.8, 0.1, 0.1, 0.0, 0.02, 0.5]
-    plain = noise.converter_noise(six)
+
+    def block_of(six: Array) -> Block:
+        return Block.of(np.arange(5000.0), six[:, ACC], six[:, GYR])
+
+    plain = noise.converter_noise(block_of(six))
     scale = 2 * 2**-23.5
     assert plain[:3] == pytest.approx(scale * np.quantile(np.abs(six[:, :3]), 0.99))
     assert plain[3:] == pytest.approx(scale * np.quantile(np.abs(six[:, 3:]), 0.99))
     assert 1e-6 < plain[0] < 2e-6
     six[::1000, 1] = 1e30
     six[5, 0] = np.nan
-    assert noise.converter_noise(six) == pytest.approx(plain, rel=0.05)
+    assert noise.converter_noise(block_of(six)) == pytest.approx(plain, rel=0.05)
     six[:, 3:] = np.nan
-    assert (noise.converter_noise(six)[3:] == 0).all()
+    assert (noise.converter_noise(block_of(six))[3:] == 0).all()

@@ -75,9 +75,8 @@ def check_chain(block: Block, about: Description) -> CheckedRecording:
 
     A session of means only cannot be checked: its rows are different positions.
     """
-    six = block.six
-    usable, dead = np.isfinite(six), dead_sensors(six)
-    del six  # an hour of samples need not be in memory once more
+    usable = np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)])
+    dead = dead_sensors(block.acc, block.gyr)
     if about.means_only:
         return CheckedRecording(block, usable, (), median_sigma(about.mean_sigma))
     faults: list[tuple[str, Fault]] = []

@@ -109,7 +109,7 @@ def _compare_windows(
         np.where(finest > 0, np.fmax(n, finest), n) for n in (noise.white, noise.quick)
     )
     # of samples that were computed; of a value that is repeated nothing is known
-    least = converter_noise(block.six)
+    least = converter_noise(block)
     white, quick = (np.where(n > 0, np.maximum(n, least), n) for n in (white, quick))
     more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0) + coarser
     for found in (white, quick, more, loud):

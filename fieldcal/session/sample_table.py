@@ -21,8 +21,15 @@ def block_from_columns(columns: dict[str, Array]) -> Block:
         kind: np.stack([columns.pop(kind + axis, unknown) for axis in "xyz"]).T
         for kind in "ag"
     }
-    rest = [columns.get(n, unknown) for n in ("temperature", "seq", "t_host")]
-    return Block(columns["t"], triad["a"], triad["g"], *rest)
+    t, *rest = (
+        _owned(columns.pop(n, unknown)) for n in ("t", "temperature", "seq", "t_host")
+    )
+    return Block(t, triad["a"], triad["g"], *rest)
+
+
+def _owned(column: Array) -> Array:
+    """The column by itself: a part of a file would keep all of it in memory."""
+    return column if column.flags.owndata else column.copy()
 
 
 def block_from_table(table: pa.Table) -> Block:

@@ -20,6 +20,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.session import description_file, sample_files, sample_table
+from fieldcal.session.arrow_encoder import ArrowEncoder
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
@@ -379,3 +380,18 @@ def test_names_are_the_same_with_blanks_around_them(tmp_path: Path) -> None:
     about = Session.open(folder(tmp_path / "s", toml)).about
     assert about.device == {"serial": "A7", "lot": "7"}
     assert about.raw["site"]["station"] == ""
+
+
+def test_samples_keep_no_file_in_memory(tmp_path: Path) -> None:
+    """Columns of a file of one batch are parts of its bytes."""
+    block = Block.of(np.arange(50.0), np.ones((50, 3)), seq=np.arange(50.0))
+    encoder = ArrowEncoder(sample_table.samples_schema())
+    path = tmp_path / "samples.arrows"
+    path.write_bytes(
+        encoder.encode(sample_table.to_record_batch(block)) + encoder.end()
+    )
+    read, _ = sample_files.read_samples(path)
+    for column in (read.t, read.seq, read.acc.T, read.gyr.T):
+        assert column.flags.c_contiguous
+        assert (column if column.base is None else column.base).flags.owndata
+    np.testing.assert_array_equal(read.seq, block.seq)

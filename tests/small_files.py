@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -112,28 +112,43 @@ def _workbook(path: Path, block: Block) -> None:
 
 
 def write_workbook(path: Path, rows: Sequence[Sequence[str | float]]) -> None:
-    """Write a workbook of one sheet, by the parts that ECMA-376 asks for."""
+    """Write a workbook of one sheet."""
+    write_workbooks(path, {"log": rows})
+
+
+def write_workbooks(
+    path: Path, sheets: Mapping[str, Sequence[Sequence[str | float]]]
+) -> None:
+    """Write a workbook of sheets by their names, by the parts ECMA-376 asks for."""
     main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
     office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
     package = "http://schemas.openxmlformats.org/package/2006"
     sheet = "application/vnd.openxmlformats-officedocument.spreadsheetml"
-    cells = "".join(f"<row>{''.join(map(_cell, row))}</row>" for row in rows)
-    link = f'<Relationship Id="r1" Type="{office}/%s" Target="%s"/>'
-    links = f'<Relationships xmlns="{package}/relationships">{link}</Relationships>'
+    link = f'<Relationship Id="r%d" Type="{office}/%s" Target="%s"/>'
+    links = f'<Relationships xmlns="{package}/relationships">%s</Relationships>'
+    own = [link % (i, "worksheet", f"worksheets/sheet{i}.xml")
+           for i, _ in enumerate(sheets, 1)]  # fmt: skip
     parts = {
         "[Content_Types].xml": f'<Types xmlns="{package}/content-types">'
         '<Default Extension="rels"'
         ' ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
         f'<Override PartName="/xl/workbook.xml" ContentType="{sheet}.sheet.main+xml"/>'
-        '<Override PartName="/xl/worksheets/sheet1.xml"'
-        f' ContentType="{sheet}.worksheet+xml"/></Types>',
-        "_rels/.rels": links % ("officeDocument", "xl/workbook.xml"),
-        "xl/_rels/workbook.xml.rels": links % ("worksheet", "worksheets/sheet1.xml"),
+        + "".join(f'<Override PartName="/xl/worksheets/sheet{i}.xml"'
+                  f' ContentType="{sheet}.worksheet+xml"/>'
+                  for i, _ in enumerate(sheets, 1))
+        + "</Types>",
+        "_rels/.rels": links % (link % (1, "officeDocument", "xl/workbook.xml")),
+        "xl/_rels/workbook.xml.rels": links % "".join(own),
         "xl/workbook.xml": f'<workbook xmlns="{main}" xmlns:r="{office}"><sheets>'
-        '<sheet name="log" sheetId="1" r:id="r1"/></sheets></workbook>',
-        "xl/worksheets/sheet1.xml": f'<worksheet xmlns="{main}"><sheetData>{cells}'
-        "</sheetData></worksheet>",
-    }
+        + "".join(f'<sheet name="{name}" sheetId="{i}" r:id="r{i}"/>'
+                  for i, name in enumerate(sheets, 1))
+        + "</sheets></workbook>",
+    }  # fmt: skip
+    for i, rows in enumerate(sheets.values(), 1):
+        cells = "".join(f"<row>{''.join(map(_cell, row))}</row>" for row in rows)
+        parts[f"xl/worksheets/sheet{i}.xml"] = (
+            f'<worksheet xmlns="{main}"><sheetData>{cells}</sheetData></worksheet>'
+        )
     with zipfile.ZipFile(path, "w") as archive:
         for name, text in parts.items():
             archive.writestr(name, text)

@@ -6,14 +6,15 @@ times of a clock are found as there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from fieldcal.core.errors import InputError
 from fieldcal.importers.csv_like import TextColumns
-from fieldcal.importing.files.gzip_stream import PIECE, unpacked_file
+from fieldcal.importing.files.gzip_stream import PIECE, OnTruncation, unpacked_file
 
 WHAT = "workbooks of spreadsheets"
 
@@ -51,8 +52,7 @@ class WorkbookSheet(TextColumns):
         """The sheet as text, its cells parted by tabs."""
         rows = self._rows()
         for first in range(0, len(rows), LINES):
-            some = rows[first : first + LINES]
-            lines = ("\t".join(map(_text, row)) for row in some)
+            lines = map(row_text, rows[first : first + LINES])
             yield ("\n".join(lines) + "\n").encode()
 
     def _rows(self) -> list[list[Any]]:
@@ -64,23 +64,70 @@ class WorkbookSheet(TextColumns):
             If it cannot be read, or is empty.
 
         """
-        from python_calamine import CalamineError, CalamineWorkbook
-
-        with unpacked_file(self.path, self.cut_off) as path:
-            try:
-                book = CalamineWorkbook.from_path(str(path))
-                sheets = {n: book.get_sheet_by_name(n) for n in book.sheet_names}
-                longest = max(sheets, key=lambda n: sheets[n].height, default="")
-                rows: list[list[Any]] = sheets[longest].to_python() if sheets else []
-            except (CalamineError, OSError, ValueError) as error:
-                raise InputError(
-                    f"{self.path}: cannot be read: {error}; save its sheet as .csv"
-                ) from error
+        with WorkbookSheets.opened(self.path, self.cut_off) as book:
+            longest = book.longest()
+            rows = book.rows(longest) if book.names else []
+            several = len(book.names) > 1
         if not rows:
             raise InputError(f"{self.path}: its sheets are empty")
         said = f"its sheet {longest!r} is read"
-        self.says += [said] if len(sheets) > 1 and said not in self.says else []
+        self.says += [said] if several and said not in self.says else []
         return rows
+
+
+class WorkbookSheets:
+    """Sheets of a workbook that is open.
+
+    Parameters
+    ----------
+    path : of the workbook, for errors
+    book : as python_calamine gives it
+
+    Attributes
+    ----------
+    names : of its sheets
+
+    """
+
+    def __init__(self, path: Path, book: Any) -> None:
+        self._path, self._book = path, book
+        self.names: list[str] = book.sheet_names
+
+    @classmethod
+    @contextmanager
+    def opened(cls, path: Path, cut: OnTruncation | None = None) -> Iterator[Self]:
+        """Open a workbook.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read.
+
+        """
+        from python_calamine import CalamineError, CalamineWorkbook
+
+        with unpacked_file(path, cut) as whole:
+            try:
+                yield cls(path, CalamineWorkbook.from_path(str(whole)))
+            except (CalamineError, OSError, ValueError) as error:
+                raise InputError(
+                    f"{path}: cannot be read: {error}; save its sheet as .csv"
+                ) from error
+
+    def longest(self) -> str:
+        """Name of the sheet with the most rows; "" without any."""
+        heights = {n: self._book.get_sheet_by_name(n).height for n in self.names}
+        return max(heights, key=heights.__getitem__, default="")
+
+    def rows(self, name: str) -> list[list[Any]]:
+        """Rows of a sheet."""
+        found: list[list[Any]] = self._book.get_sheet_by_name(name).to_python()
+        return found
+
+
+def row_text(row: Sequence[Any]) -> str:
+    """Text of a row, its cells parted by tabs."""
+    return "\t".join(map(_text, row))
 
 
 def _text(value: Any) -> str:

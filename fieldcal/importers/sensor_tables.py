@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import takewhile
+from itertools import islice, takewhile
 from pathlib import Path
 
 from fieldcal.importers.arrays import ArrayFile
@@ -21,7 +21,8 @@ from fieldcal.importing.records.sensor_blocks import (
     joined_blocks,
     sensor_blocks,
 )
-from fieldcal.importing.text.text_lines import split_lines
+from fieldcal.importing.text.text_lines import TOP, split_lines
+from fieldcal.importing.text.text_top import find_stated_rate
 
 WHAT = "text with a table for each sensor, one below the other"
 
@@ -62,6 +63,10 @@ class SensorTables(ArrayFile):
     def needs(self) -> tuple[tuple[str, ...], str]:
         """Return what reading it takes: nothing."""
         return (), ""
+
+    def rate_said(self) -> tuple[float, str] | None:
+        """Rate that a line at the top says."""
+        return find_stated_rate([*islice(self.text_lines(), TOP)], None)
 
     @contextmanager
     def _whole_arrays(self) -> Iterator[dict[str, ArrayTable]]:

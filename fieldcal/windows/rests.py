@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, runs_of_true
 from fieldcal.windows.cells import CELL, CellRows, CellTable, fill_with_previous
@@ -48,11 +49,13 @@ _RATE = 0.02
 """Least difference from the gyroscopes' rate at rest that is a rotation, rad/s."""
 
 SpanSpreads = tuple[int, Array, Array]
-"""First of some spans, the spread and the mean of each, (k, 6)."""
+"""First of some spans, the spread and the mean of each, (k, 6).
+
+Where a channel has no value, its spread is 0 and its mean is nan."""
 
 
 class RestRun(NamedTuple):
-    """Spans [first, last) at rest, and the median rate there, (3,) rad/s."""
+    """Spans [first, last) at rest, and the median rate there, (3,) rad/s or nan."""
 
     first: int
     last: int
@@ -111,7 +114,14 @@ def _spans(rows: CellRows, usual: _TypicalCells) -> Iterator[SpanSpreads]:
         spread = view.std(axis=-1)
         paused = np.concatenate([[0], np.cumsum(np.diff(cells.times) > usual.pause)])
         spread[paused[SPREAD_CELLS - 1 :] > paused[: len(spread)]] = np.inf
-        yield first, spread, view.mean(axis=-1)
+        known = np.lib.stride_tricks.sliding_window_view(
+            cells.counts > 0, SPREAD_CELLS, axis=0
+        ).any(axis=-1)
+        yield (
+            first,
+            np.where(known | np.isinf(spread), spread, 0.0),
+            np.where(known, view.mean(axis=-1), np.nan),
+        )
 
 
 def _typical_cells(rows: CellRows) -> _TypicalCells:
@@ -142,14 +152,15 @@ def find_rest_runs(rows: CellRows, bound: Array) -> list[RestRun]:
     short = list(_spans(rows, usual)) if len(rows) <= _PART else []
     sampled = np.concatenate(
         [
-            spread[-first % every :: every].copy()
-            for first, spread, _ in short or _spans(rows, usual)
-        ]
+            np.stack([spread, level])[:, -first % every :: every].copy()
+            for first, spread, level in short or _spans(rows, usual)
+        ],
+        axis=1,
     )
-    sampled = sampled[np.isfinite(sampled).all(axis=1)]
+    sampled, levels = sampled[:, np.isfinite(sampled[0]).all(axis=1)]
     if not len(sampled):
         return []
-    quiet = np.quantile(sampled, 0.1, axis=0)
+    quiet = _lower_decile(sampled, np.isfinite(levels))
     scale = np.where(quiet > 0, quiet, np.inf)
     valley = np.clip(_splitting_threshold((sampled / scale).max(axis=1)), _LEAST, _MOST)
     kept: list[RestRun] = []
@@ -160,7 +171,7 @@ def find_rest_runs(rows: CellRows, bound: Array) -> list[RestRun]:
         own = np.maximum(own, usual.flips / _OWN)
         own = np.where(own > 0, own, np.inf)
         for a, b in runs_of_true(np.all(spread < _OWN * own, axis=1)):
-            rate = np.median(level[a:b, 3:], axis=0)
+            rate = _median_of_known(level[a:b, 3:])
             kept.append(RestRun(first + a, first + b, rate))
     if not kept:
         return []
@@ -196,10 +207,26 @@ def _concatenate(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
     return np.concatenate(spreads), np.concatenate(levels)
 
 
+def _lower_decile(values: Array, known: NDArray[np.bool_]) -> Array:
+    """Lower decile of each column of `values` (n, c) where known; 0 where nowhere."""
+    columns = zip(values.T, known.T, strict=True)
+    return np.array([np.quantile(x[k], 0.1) if k.any() else 0.0 for x, k in columns])
+
+
+def _median_of_known(values: Array) -> Array:
+    """Median of each column of `values` (n, c); nan where none is known."""
+    known = np.isfinite(values).any(axis=0)
+    return np.where(known, np.nanmedian(np.where(known, values, 0.0), axis=0), np.nan)
+
+
 def _weighted_median(values: Array, weights: Any) -> Array:
-    """Median of each column of `values` (n, c), each counted `weights` (n,) times."""
+    """Median of each column of `values` (n, c), each counted `weights` (n,) times.
+
+    What is nan counts nothing.
+    """
     order = np.argsort(values, axis=0)
-    total = np.cumsum(weights[order], axis=0)
+    counted = np.isfinite(values) * np.asarray(weights)[:, None]
+    total = np.cumsum(np.take_along_axis(counted, order, axis=0), axis=0)
     middle = (2 * total < total[-1]).sum(axis=0)
     place = np.take_along_axis(order, middle[None], axis=0)
     median: Array = np.take_along_axis(values, place, axis=0)[0]

@@ -57,6 +57,13 @@ TEXTS = {
     ),
     "words": f"{WORDS}{rows(ACC, 'accelerometer,')}{rows(GYR, 'gyroscope,')}",
     "words alone": rows(ACC, "acc;", ";") + rows(GYR, "gyr;", ";"),
+    "titles alone": f"Accelerometer\n{rows(ACC)}Gyroscope\n{rows(GYR)}",
+    "matrices in C": "".join(
+        f"const float {name}[][4] = {{\n"
+        + "".join(f"  {{{line}f}},\n" for line in rows(table).split("\n")[:-1])
+        + "};\n"
+        for name, table in (("acc", ACC), ("gyro", GYR))
+    ),
     "decimal commas": (
         f"time;ax;ay;az\n{rows(ACC, '', ';')}time;gx;gy;gz\n{rows(GYR, '', ';')}"
     ).replace(".", ","),
@@ -67,6 +74,14 @@ TEXTS = {
 def test_tables_below_each_other_are_put_side_by_side(how: str, tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(TEXTS[how])
+    assert_same(read_files([path])[0])
+
+
+def test_matrices_of_a_script_have_the_rate_that_it_says(tmp_path: Path) -> None:
+    path = tmp_path / "log.m"
+    parts = (f"{name} = [\n{rows(table[:, 1:], '', ' ')}];\n".replace("\n", ";\n")
+             for name, table in (("acc", ACC), ("gyro", GYR)))  # fmt: skip
+    path.write_text("fs = 50;\n" + "".join(parts).replace("[;", "[").replace(";;", ";"))
     assert_same(read_files([path])[0])
 
 

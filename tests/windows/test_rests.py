@@ -97,6 +97,15 @@ def test_a_weighted_median_counts_each_value_so_many_times() -> None:
         np.testing.assert_array_equal(found, lower)
 
 
+def test_what_is_not_known_counts_nothing() -> None:
+    values = np.array([[1.0, np.nan], [5.0, np.nan], [np.nan, np.nan]])
+    found = rests._weighted_median(values, np.array([1, 3, 9]))
+    np.testing.assert_array_equal(found, [5.0, np.nan])
+    np.testing.assert_array_equal(rests._median_of_known(values), [3.0, np.nan])
+    known = np.isfinite(values)
+    np.testing.assert_allclose(rests._lower_decile(values, known), [1.4, 0.0])
+
+
 @pytest.mark.parametrize("longest", [7, 36_000])
 def test_calm_runs_go_on_from_part_to_part_up_to_the_longest(
     monkeypatch: pytest.MonkeyPatch, longest: int

@@ -13,6 +13,9 @@
     …
     gyroscope,0.00,0.01,0.02,0.03
 
+    const float acc[][3] = {           or matrices in a program's source
+      {0.1f, 0.2f, 9.8f},
+
 A table of a sensor that comes again goes on.
 """
 
@@ -24,6 +27,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.importing.text.matrix_rows import without_brackets
 from fieldcal.importing.text.text_lines import MISSING
 from fieldcal.importing.text.text_top import (
     find_separator,
@@ -43,8 +47,11 @@ NARROWEST = 3
 SENSOR = {"acc": "a", "gyr": "g"}
 """Kind of what a title calls so."""
 
-UNNAMED = ("time", *AXES)
-"""Columns of rows behind a word, where no line names them."""
+UNNAMED = {len(names): names for names in (AXES, ("time", *AXES))}
+"""Columns of rows behind a word or below a title, where no line names them."""
+
+END_MARK = ";"
+"""What may stand at the end of a row."""
 
 
 @dataclass
@@ -100,7 +107,9 @@ def sensor_blocks(lines: Iterable[str]) -> Iterator[SensorBlock]:
     words: list[str] = []
     open_one: SensorBlock | None = None
     named: tuple[str, ...] = ()
-    for line in lines:
+    for line in without_brackets(lines):
+        bare = line.rstrip().removesuffix(END_MARK)
+        line = line if END_MARK in bare else bare
         separator = find_separator(line)
         cells = split_cells(line, separator)
         at = _place_of_word(cells, separator)
@@ -108,22 +117,20 @@ def sensor_blocks(lines: Iterable[str]) -> Iterator[SensorBlock]:
             words.append(line)
             continue
         word = cells.pop(at) if at >= 0 else ""
+        title = word or _title(words)
         above = _names(words, len(cells) + (at >= 0))
         if above is not None:
             named = (*above[:at], *above[at + 1 :]) if at >= 0 else above
-        elif at >= 0 and len(cells) == len(UNNAMED) and len(named) != len(cells):
-            named = UNNAMED
+        elif title and len(named) != len(cells):
+            named = UNNAMED.get(len(cells), named)
+        words = []
         goes_on = open_one is not None and len(open_one.names) == len(cells)
-        if word or above is not None or not goes_on:
-            title = word or _title(words)
-            same = goes_on and open_one is not None and open_one.title == title
-            if not same or open_one is None or open_one.names != named:
-                if len(named) != len(cells):
-                    words = []
-                    continue
+        if title or above is not None or not goes_on:
+            if len(named) != len(cells):
+                continue
+            if open_one is None or (open_one.title, open_one.names) != (title, named):
                 open_one = SensorBlock(title, named, separator)
                 yield open_one
-        words = []
         if open_one is not None:
             open_one.rows.append(cells)
 

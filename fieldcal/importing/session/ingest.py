@@ -169,7 +169,7 @@ def _write_session(
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
     recording.says += judge.says
     if "position" not in about:
-        recording.says += seen.held.says(facts.rate_hz)
+        recording.says += [*seen.held.says(facts.rate_hz), *facts.silences()]
     recording.says += [said for said in (found.how, found.left_out) if said]
     recording.says += [step.sentence() for step in clock.steps]
     repairs = [*recording.mended, *judge.mended]

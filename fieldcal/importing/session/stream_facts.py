@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.importing.words.file_names import SENSOR
 
 LONG = 5.0
 """Mean periods without a sample that are a gap."""
@@ -47,6 +48,7 @@ class StreamFacts:
     left_out : rows that were left out, where that was asked for
     first_arrival_s : of the first sample by the host's clock, s; nan if unknown
     measured : "a" if any accelerometer has a number, and "g" if any gyroscope has
+    spans : first and last time at which each sensor, acc or gyr, has a number, s
 
     """
 
@@ -62,6 +64,7 @@ class StreamFacts:
     left_out: int = 0
     first_arrival_s: float = float("nan")
     measured: str = ""
+    spans: dict[str, tuple[float, float]] = field(default_factory=dict)
     _period: float = float("nan")
 
     def add(self, block: Block) -> None:
@@ -81,9 +84,15 @@ class StreamFacts:
             if len(long):
                 self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
         self.rows += len(block)
-        for kind, three in (("a", block.acc), ("g", block.gyr)):
-            if kind not in self.measured and np.isfinite(three).any():
-                self.measured += kind
+        for sensor, three in (("acc", block.acc), ("gyr", block.gyr)):
+            (rows,) = np.nonzero(np.isfinite(three).any(axis=1))
+            if not len(rows):
+                continue
+            first = float(block.t[rows[0]])
+            if sensor not in self.spans:
+                self.measured += sensor[0]
+            began, _ = self.spans.get(sensor, (first, first))
+            self.spans[sensor] = (began, float(block.t[rows[-1]]))
         self.end_s = float(block.t[-1])
         known = block.temperature[np.isfinite(block.temperature)]
         if len(known):
@@ -111,10 +120,28 @@ class StreamFacts:
             says.append(f"{gaps} {self.longest_gap_s:.3g} s")
         return ", ".join(says)
 
+    def silences(self) -> list[str]:
+        """Which sensor begins late or ends early, a sentence each."""
+        said = []
+        for sensor, (first, last) in self.spans.items():
+            whens = []
+            if first - self.start_s > MIN_PAUSE_S:
+                whens.append(f"before {first:.1f} s")
+            if self.end_s - last > MIN_PAUSE_S:
+                whens.append(f"after {last:.1f} s")
+            if whens:
+                said.append(
+                    f"its {SENSOR[sensor]} have no values {' and '.join(whens)}: rests"
+                    " there are of the other sensor alone"
+                )
+        return said
+
     def table(self) -> dict[str, Any]:
         """What a mark keeps of it."""
         kept = {
-            k: v for k, v in asdict(self).items() if k[0] != "_" and k != "measured"
+            k: v
+            for k, v in asdict(self).items()
+            if k[0] != "_" and k not in ("measured", "spans")
         }
         rate = self.rate_hz
         return kept | {"rate_hz": round(rate, 6) if np.isfinite(rate) else None}

@@ -7,6 +7,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     Data,4,accelerometer_data,…,"0|10" messages of a FIT file
     RAW_IMU {time_usec : 5, xacc : 3}  messages of MAVLink as mavlogdump shows them
     <UBX(ESF-MEAS, timeTag=5, …)>      messages of u-blox as pyubx2 prints them
+    {0.01f, 0.1f, 0.2f, 9.8f},         rows of a matrix in a program, or of SQL
     IMU:0.1,0.2,9.8,0,0,0              a word before the columns
     AcX,12,AcY,-45,AcZ,16384           values behind cells with their names
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
@@ -58,6 +59,7 @@ from fieldcal.importing.text.line_forms import (
     WordPrefix,
 )
 from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
+from fieldcal.importing.text.matrix_rows import MatrixRows
 from fieldcal.importing.text.mavlink_text import MavlinkText
 from fieldcal.importing.text.nested_values import NestedValues
 from fieldcal.importing.text.paired_cells import PairedCells
@@ -268,8 +270,8 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 FORMS: tuple[type[TextForm], ...] = (
     DataflashText, MavlinkText, UbxLines, FitCsv, LabviewText, ScaledCounts, RateOnTop,
     ReceiverLines, VectorNavLines, ZephyrLines, SaulLines,
-    CheckedLines, EchoedMessages, EndedLines, Timecodes, DatabasePoints, GroupedDigits,
-    QuotedCells, SpacedCells, PairedCells, FortranNumbers, UnitCells,
+    CheckedLines, EchoedMessages, MatrixRows, EndedLines, Timecodes, DatabasePoints,
+    GroupedDigits, QuotedCells, SpacedCells, PairedCells, FortranNumbers, UnitCells,
     LongTable, NestedValues, LabelledValues, WordPrefix, BarTable, ListCells,
     SplitDecimals, SensorCodes, TaggedLines, ArrivalPrefix, HexCells, BareFractions,
     ClockColumn,

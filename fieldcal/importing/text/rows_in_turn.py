@@ -3,24 +3,20 @@
 time,ax,ay,az,gx,gy,gz             two sensors with times of their own, merged by time:
 0.000,0.1,0.2,9.8,,,               no row has both, so no row tells how the force turns
 0.004,,,,0.01,0.02,0.03            with the rates
-
-0.000,0.1,0.2,9.8,0.01,0.02,0.03   a sensor that is slower than the rows: no two
-0.004,,,,0.01,0.02,0.03            neighbours tell its noise
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import fields
 from functools import partial
 from itertools import chain, tee
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.times.alignment import AlignedPair
 from fieldcal.importing.times.row_validator import RowValidator
+from fieldcal.importing.times.slower_sensor import known_sensors
 
 MIN_ROWS = 20
 """Rows of each sensor that tell."""
@@ -28,16 +24,12 @@ MIN_ROWS = 20
 MAX_SHARED_ROWS = 0.05
 """Share of the rows with values that has both at most: two times may be the same."""
 
-SLOWER = 0.2
-"""Share of rows that lack a sensor which is slower; of others some are lost."""
-
 
 class RowsInTurn:
     """Makes rows of both sensors.
 
     Where no row has both, each sample of the accelerometer goes with the nearest of the
-    gyroscope; where one sensor is slower than the rows, those without it are left out.
-    Other rows stay as they are.
+    gyroscope. Other rows stay as they are.
 
     Parameters
     ----------
@@ -65,17 +57,13 @@ class RowsInTurn:
         first = next(flow, None)
         if first is None:
             return
-        acc, gyr = _known(first)
+        acc, gyr = known_sensors(first)
         many = (acc & ~gyr).sum(), (gyr & ~acc).sum()
         self.told = min(many) >= MIN_ROWS and (
             acc & gyr
         ).sum() <= MAX_SHARED_ROWS * sum(many)
         if not self.told:
-            alone = acc ^ gyr
-            slow = sum(many) > SLOWER * len(first) and _alternate(alone, acc & gyr)
-            yield from (
-                self._whole(chain([first], flow)) if slow else chain([first], flow)
-            )
+            yield from chain([first], flow)
             return
         yield from self._paired(chain([first], flow))
 
@@ -98,22 +86,9 @@ class RowsInTurn:
 
     def _forces(self, block: Block) -> Block:
         """Samples of the accelerometer alone."""
-        acc, _ = _known(block)
+        acc, _ = known_sensors(block)
         warm = self._warmth(block.temperature)[acc]
         return Block.of(block.t[acc], block.acc[acc], None, warm)
-
-    def _whole(self, blocks: Iterable[Block]) -> Iterator[Block]:
-        """Rows of both sensors alone."""
-        left = 0
-        for block in blocks:
-            acc, gyr = _known(block)
-            both = acc & gyr
-            left += len(block) - int(both.sum())
-            yield Block(*(getattr(block, f.name)[both] for f in fields(Block)))
-        self.says.append(
-            "one of its sensors is slower than its rows: those that lack it are left"
-            f" out, {left} in all"
-        )
 
     def _warmth(self, values: Array) -> Array:
         """Temperatures (n,), those that are missing as they were last known."""
@@ -133,20 +108,6 @@ def _sample_of(sensor: str, number: int) -> str:
 
 def _rates(block: Block) -> Block:
     """Samples of the gyroscope alone."""
-    _, gyr = _known(block)
+    _, gyr = known_sensors(block)
     unknown = np.full((int(gyr.sum()), 3), np.nan)
     return Block.of(block.t[gyr], unknown, block.gyr[gyr])
-
-
-def _alternate(alone: NDArray[np.bool_], both: NDArray[np.bool_]) -> bool:
-    """Whether rows (n,) of one sensor lie between those of both, few at a time."""
-    if both.sum() < MIN_ROWS or alone.sum() < MIN_ROWS:
-        return False
-    starts = np.count_nonzero(np.diff(alone.astype(int)) == 1)
-    return bool(starts > min(alone.sum(), both.sum()) / 2)
-
-
-def _known(block: Block) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Rows (n,) of which the accelerometer is known, and the gyroscope."""
-    acc, gyr = (np.isfinite(x.sum(axis=1)) for x in (block.acc, block.gyr))
-    return acc, gyr

@@ -99,6 +99,28 @@ def _series(path: Path, block: Block) -> None:
     path.write_text("\n".join(["time,variable,value", *lines]) + "\n")
 
 
+def _tables(path: Path, block: Block) -> None:
+    """One below the other."""
+    parts = []
+    for names, columns in (COLUMNS[1:4], (0, 1, 2, 3)), (COLUMNS[4:7], (0, 4, 5, 6)):
+        lines = [
+            ",".join(repr(row[i]) for i in columns) for row in table(block).tolist()
+        ]
+        parts += [",".join(["time", *names]), *lines]
+    path.write_text("\n".join(parts) + "\n")
+
+
+def _sheets(path: Path, block: Block) -> None:
+    rows = table(block)
+    sheets = {
+        name: [["t", "x", "y", "z"], *np.column_stack([rows[:, 0], three]).tolist()]
+        for name, three in (
+            ("Accelerometer", rows[:, 1:4]), ("Gyroscope", rows[:, 4:7])
+        )
+    }  # fmt: skip
+    write_workbooks(path, sheets)
+
+
 def _octave(path: Path, block: Block) -> None:
     parts = ["# Created by Octave 6.4.0, Mon Jan 05 12:00:00 2026 UTC <me@pc>"]
     for name, column in zip(COLUMNS, table(block).T.tolist(), strict=True):
@@ -174,6 +196,8 @@ SMALL: dict[str, Callable[[Path, Block], object]] = {
     "markup_log": _markup,
     "series_log": _series,
     "octave_text": _octave,
+    "sensor_tables": _tables,
+    "sensor_sheets": _sheets,
     "blackbox": lambda path, block: path.write_bytes(of_block(block)),
     "parquet": _parquet,
     "workbook": _workbook,
@@ -182,7 +206,8 @@ SMALL: dict[str, Callable[[Path, Block], object]] = {
 
 
 OF_NAMES = ("mcap", "rosbag", "phone_zip", "json_log", "blackbox", "sqlite_log",
-            "markup_log", "series_log", "octave_text")  # fmt: skip
+            "markup_log", "series_log", "octave_text", "sensor_tables",
+            "sensor_sheets")  # fmt: skip
 """Formats whose channels names tell."""
 
 

@@ -29,6 +29,7 @@ from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.alignment import AlignedPair
 from fieldcal.importing.times.gravity_sum import GravitySum, lacks_gravity
 from fieldcal.importing.times.row_validator import RowValidator
+from fieldcal.importing.times.slower_sensor import SlowerSensor
 from fieldcal.importing.words.file_names import ACC, GRAVITY, GYR, LINEAR, TOTAL
 from fieldcal.importing.words.telephone_names import UNTOLD
 
@@ -133,7 +134,9 @@ class PhoneArchive(Recording):
         acc, total = flows["a"], GravitySum()
         if "v" in flows:
             acc = total.through(acc, flows["v"])
-        yield from AlignedPair().through(acc, flows.get("g", iter(())))
+        slower = SlowerSensor()
+        yield from slower.through(AlignedPair().through(acc, flows.get("g", iter(()))))
+        self.says += [s for s in slower.says if s not in self.says]
         for kind, one in both.items():
             said = [*one.mended, *judges[kind].mended]
             self.mended += [f"{one.member}: {sentence}" for sentence in said]

@@ -1,7 +1,7 @@
 """Texts with a table for each sensor, one below the other.
 
-What tells such a text stands far below its first lines: where these hold a table of one
-sensor alone, the lines behind are looked through for one of the other.
+What tells such a text may stand far below its first lines: where these are a table of
+one sensor alone, the lines behind are looked through for one of the other.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from itertools import islice, takewhile
 from pathlib import Path
 
+from fieldcal.core.errors import InputError
 from fieldcal.importers.arrays import ArrayFile
 from fieldcal.importing.arrays.array_groups import arrays_in_group
 from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
@@ -26,6 +27,9 @@ from fieldcal.importing.text.text_top import find_stated_rate
 
 WHAT = "text with a table for each sensor, one below the other"
 
+FEWEST = 10
+"""Rows of a table: lines that come in turn are read as such."""
+
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether a text begins with one sensor alone, and holds the other below."""
@@ -33,7 +37,8 @@ def recognises(head: bytes, path: Path) -> bool:
         return False
     (top,) = [*as_utf8([head])] or [b""]
     blocks = [*sensor_blocks(split_lines(top)[:-1])]
-    if {one.sensor for one in blocks} not in ({"a"}, {"g"}):
+    in_turn = any(len(one.rows) < FEWEST for one in blocks[:-1])
+    if not blocks or in_turn or not blocks[0].sensor:
         return False
     whole = _lines(unpacked_pieces(path, PIECE, lambda where, what: None))
     return _hold_both(whole)
@@ -70,9 +75,21 @@ class SensorTables(ArrayFile):
 
     @contextmanager
     def _whole_arrays(self) -> Iterator[dict[str, ArrayTable]]:
-        """Columns of each table."""
+        """Columns of each table.
+
+        Raises
+        ------
+        InputError
+            If it has no table of one of the sensors, as where it was cut off.
+
+        """
         if self._loaded is None:
             blocks = joined_blocks(sensor_blocks(self.text_lines()))
+            if not {*SENSOR.values()} <= {one.sensor for one in blocks}:
+                raise InputError(
+                    f"{self.path}: has not a table of each sensor: copy it again from"
+                    " where it came, or import the one with --format csv_like"
+                )
             self._loaded = {
                 name: table_of(values, unit)
                 for one in blocks

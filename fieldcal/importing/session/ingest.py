@@ -19,10 +19,10 @@ from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.session.found_rests import RestSearch, find_rests
 from fieldcal.importing.session.held_values import HeldValues
+from fieldcal.importing.session.late_rates import late_rates
 from fieldcal.importing.session.sample_writer import SampleWriter, file_record
 from fieldcal.importing.session.stream_facts import StreamFacts
 from fieldcal.importing.times.row_validator import RowValidator
-from fieldcal.importing.times.slower_sensor import SlowerSensor
 from fieldcal.importing.units.scales import MIN_ROWS
 from fieldcal.importing.units.time_units import SLOWEST_HZ, recording_date
 from fieldcal.session.clock_steps import ClockStep, ClockStepRemover
@@ -192,9 +192,7 @@ def _write_samples(
     facts, held, clock = StreamFacts(), HeldValues(), ClockStepRemover()
     cells, jumps = CellAccumulator(), JumpFinder()
     with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
-        slower = SlowerSensor()
-        whole = slower.through(recording.blocks(stream))
-        blocks = _without_clock_steps(clock, whole)
+        blocks = _without_clock_steps(clock, recording.blocks(stream))
         for good in judge.through(blocks):
             if len(good):
                 facts.add(good)
@@ -204,11 +202,12 @@ def _write_samples(
                     jumps.add(good)
                 rows.add(cell_rows(cells.take_complete()))
                 written.add(good)
-        recording.says += slower.says
         _refuse_useless(recording, facts, means)
         facts.left_out = judge.left_out
         written.close()
         rests = find_rests(jumps, rows, cells.table, written.between, still)
+        late = "" if means else late_rates(rows)
+        recording.says += [late] if late else []
     return _WrittenRows(facts, held, clock, judge, rests)
 
 

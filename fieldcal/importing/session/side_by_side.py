@@ -17,6 +17,7 @@ from fieldcal.importing.session.merge import (
 )
 from fieldcal.importing.times.alignment import AlignedPair
 from fieldcal.importing.times.row_validator import RowValidator
+from fieldcal.importing.times.slower_sensor import SlowerSensor
 
 PEEKED = 64
 """Rows that tell whether two files have the same times."""
@@ -67,8 +68,8 @@ class MergedFiles(SeveralFiles):
             judge.through(p.blocks(stream_name(p)))
             for judge, p in zip(judges, both, strict=True)
         )
-        together = False
-        for block in pair.through(forces, rates):
+        together, slower = False, SlowerSensor()
+        for block in slower.through(pair.through(forces, rates)):
             if np.isnan(begin) and len(block):
                 begin = self.began = float(block.t[0])
             together = together or bool(np.isfinite(block.gyr).any())
@@ -83,6 +84,7 @@ class MergedFiles(SeveralFiles):
             "its accelerometers and gyroscopes have times of their own: each sample of"
             f" the first goes with the nearest, {1e3 * pair.worst:.2g} ms apart at most"
         )
+        self.says += slower.says
 
     def _row_by_row(self, stream: str) -> Iterator[Block]:
         flows = [part.blocks(stream) for part in self._parts]

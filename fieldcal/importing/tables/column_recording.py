@@ -29,6 +29,7 @@ from fieldcal.importing.tables.scatter_columns import scatter_columns
 from fieldcal.importing.tables.table_speeds import speed_columns, speed_unit
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
 from fieldcal.importing.times.row_validator import RowValidator
+from fieldcal.importing.times.slower_sensor import SlowerSensor
 from fieldcal.importing.words.file_names import SENSOR, sensor_of_file_name
 
 
@@ -112,9 +113,13 @@ class ColumnRecording(Recording):
         if len(self.imus()) > 1:
             yield from self.alone(stream).blocks(stream)
             return
-        if self._own_times is not None:
-            yield from self._sensors_apart(self._own_times)
-            return
+        slower, own = SlowerSensor(), self._own_times
+        whole = self._sensors_apart(own) if own is not None else self._in_rows()
+        yield from slower.through(whole)
+        self.says += [s for s in slower.says if s not in self.says]
+
+    def _in_rows(self) -> Iterator[Block]:
+        """Samples of rows that hold both sensors, or one of them each."""
         rows = RowsInTurn(str(self.path), self.repair)
         for block in rows.through(self.read_samples()):
             self.in_turn = rows.told

@@ -20,7 +20,7 @@ from fieldcal.importing.files.gzip_stream import unpacked_pieces
 from fieldcal.session.folder import Session
 
 NO_STREAM = ("arrays", "parquet", "phone_zip", "workbook", "sqlite_log", "octave_text",
-             "series_log")  # fmt: skip
+             "series_log", "sensor_tables", "sensor_sheets")  # fmt: skip
 """Formats that nothing, or no whole sample, can be read of without their end."""
 
 

@@ -115,7 +115,7 @@ def _matrix(lines: Sequence[str], said: Mapping[str, str], many: int) -> Array:
         rows = [[float(cell) for cell in line.split()] for line in lines]
     except ValueError as error:
         raise InputError(f"variable {said['name']}: {error}; save it again") from None
-    if len(rows) != many or any(str(len(row)) != wide for row in rows):
+    if not rows or len(rows) != many or any(str(len(row)) != wide for row in rows):
         raise InputError(
             f"variable {said['name']}: has not {many} rows of {wide} numbers, as it"
             " says: copy the file again from where it came"

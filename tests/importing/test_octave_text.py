@@ -52,6 +52,13 @@ def test_one_that_is_cut_off_is_refused(tmp_path: Path) -> None:
         read_files([path])
 
 
+def test_one_whose_number_of_rows_is_damaged_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    path.write_text(variables(True).replace("# rows: 1150", "# rows: \0", 1))
+    with pytest.raises(InputError, match="variable t: has not 0 rows of 1 numbers"):
+        read_files([path])
+
+
 @given(st.text(alphabet="# name:typerowscolumnsmatrix0123 \n", max_size=300))
 def test_no_text_breaks_the_reader(text: str) -> None:
     try:

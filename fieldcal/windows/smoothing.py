@@ -131,12 +131,12 @@ def _of_sensor(rests: Sequence[Array], step: Array) -> Share | None:
     if moved.any():
         still = [RestSums.of(y[:, moved]) for y in late]
         found = share_kept(still)
-        if found and _is_slow(found):
+        if found and _is_slow(found, rests):
             found = _with_decays([y[:, moved] for y in rests], found)
             if _is_program(still, found, step[moved]):
                 return found
     found = share_by_decays(rests, step)
-    return found if found and _is_slow(found) else None
+    return found if found and _is_slow(found, rests) else None
 
 
 def _common(
@@ -167,8 +167,9 @@ def _slow_parts(rests: Sequence[Array], found: Share) -> float:
     return 1 + 2 * float(_correlation(late, found).sum()) if late else 0.0
 
 
-def _is_slow(found: Share) -> bool:
-    return found.samples >= LEAST_TIME
+def _is_slow(found: Share, rests: Sequence[Array]) -> bool:
+    """Whether it is slower than a sensor's noise, and quicker than the longest rest."""
+    return LEAST_TIME <= found.samples <= max(len(y) for y in rests)
 
 
 def _is_program(still: Sequence[RestSums], found: Share, step: Array) -> bool:
@@ -204,16 +205,16 @@ def _correlation(still: Sequence[RestSums], found: Share) -> Array:
 
 
 def _with_decays(rests: Sequence[Array], by_noise: Share) -> Share:
-    """K by all samples from which on the device rests, decays among them.
+    """Share by all samples from which on the device rests, decays among them.
 
-    Where decays add little, k is known as well as noise can tell it.
+    Where decays add little, it is known as well as noise can tell it.
     """
     found = by_noise
     for _ in range(ROUNDS):
         held = [y[_rest_begin(y, found.kept) :] for y in rests]
         parts = [RestSums.of(y) for y in held if len(y) >= MIN_SAMPLES]
         again = share_kept(parts, near=found) if parts else None
-        found = again if again and _is_slow(again) else found
+        found = again if again and _is_slow(again, rests) else found
     slow = SLOW_NOISE * (1 - found.kept)
     if found.sigma > by_noise.sigma / 3:
         return replace(found, sigma=float(np.hypot(found.sigma, slow)))

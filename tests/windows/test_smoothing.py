@@ -144,6 +144,14 @@ def test_windows_that_hold_nothing_say_nothing() -> None:
     assert both(np.zeros((50, 3)), np.zeros((50, 3)), windows) == (None, None)
 
 
+def test_a_walk_through_all_of_a_rest_is_no_filter() -> None:
+    """Its k comes as near to 1 as one likes, and so would what must be looked at."""
+    rng = np.random.default_rng(4)
+    y, windows = np.cumsum(rng.normal(size=(9000, 6)), axis=0), np.array([[0, 9000]])
+    assert find_smoothing(y, windows, np.zeros(6)) == (None, None)
+    assert find_smoothing(np.cumsum(y, axis=0), windows, np.zeros(6)) == (None, None)
+
+
 def test_one_program_smooths_both_sensors_alike() -> None:
     """As well as the better of them says, whose turns were longer."""
     for seed in range(4):

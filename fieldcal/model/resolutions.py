@@ -128,6 +128,10 @@ BAND_RATIO, MIN_BAND_COEFFICIENTS = 1.25, 5
 """Of the ends of a band of noise, and coefficients of one at least, whose power is then
 known to 60 %."""
 
+CENTRE_EVERY = 10
+"""Samples of the first window of which one is looked at for what is subtracted from
+all, to keep the rounding of their sums small: any number near their mean does."""
+
 # -- the temperature
 
 VALUE_HALF_SPANS_S = (12.0, 8.0, 5.0, 3.0)

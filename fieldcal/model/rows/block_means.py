@@ -7,10 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Block, Index, Mask
-
-CENTRE_EVERY = 10
-"""Samples of a window of which one is looked at for what is subtracted from all, to
-keep the rounding of their sums small."""
+from fieldcal.model import resolutions
 
 
 def masked(block: Block, usable: Mask) -> Block:
@@ -33,7 +30,9 @@ def block_means(block: Block, bound: Index) -> tuple[Array, Index]:
 
 
 def _triad_means(triad: Array, bound: Index) -> tuple[Array, Index]:
-    centre = np.nan_to_num(_middle(triad[bound[0, 0] : bound[0, 1] : CENTRE_EVERY]))
+    centre = np.nan_to_num(
+        _middle(triad[bound[0, 0] : bound[0, 1] : resolutions.CENTRE_EVERY])
+    )
     mean, count = np.empty((len(bound), 3)), np.empty((len(bound), 3), dtype=np.intp)
     # window by window: what is taken at a time stays small
     gaps = np.flatnonzero(bound[1:, 0] != bound[:-1, 1]) + 1

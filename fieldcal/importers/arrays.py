@@ -38,9 +38,7 @@ from fieldcal.importing.arrays.matlab_objects import holds_objects, object_table
 from fieldcal.importing.arrays.paired_tables import ArrayPairing, pair_arrays
 from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
 from fieldcal.importing.headings.heading import Heading
-from fieldcal.importing.read_options import ReadOptions
-from fieldcal.importing.recording import Recording
-from fieldcal.importing.tables.column_recording import ColumnRecording
+from fieldcal.importing.tables.divided_recording import DividedRecording
 from fieldcal.importing.times.said_rate import named_scalars, stated_rate
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
@@ -64,7 +62,7 @@ def _is_hdf5(head: bytes) -> bool:
     return head.startswith(HDF5) or head[512:520] == HDF5
 
 
-class ArrayFile(ColumnRecording):
+class ArrayFile(DividedRecording):
     """Arrays with names, with one IMU in them or several."""
 
     _loaded: dict[str, ArrayTable] | None = None
@@ -81,27 +79,10 @@ class ArrayFile(ColumnRecording):
     """The only group that is read, where each of several holds an IMU."""
     device = ""
     """The only device that is read, where a column tells the rows of several apart."""
-    parts_found: dict[str, Self] | None = None
-    """The file with one such group or device alone, by the name of its IMU."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
         return (("h5py",) if _is_hdf5(first_bytes(self.path)) else ()), "hdf5"
-
-    def imus(self) -> dict[str, ReadOptions]:
-        """Options of each IMU, of which each may lie in a group of its own."""
-        if self.imus_found is None and (parts := self._in_parts()):
-            self.imus_found = {}
-            for name, part in parts.items():
-                (wanted,) = part.imus().values()
-                self.imus_found[name] = wanted
-                part.imus_found = {name: wanted}
-                self.says += [s for s in part.says if s not in self.says]
-        return super().imus()
-
-    def alone(self, stream: str) -> Recording:
-        """The recording of one IMU, as far as it has a group or rows of its own."""
-        return self._in_parts().get(stream) or super().alone(stream)
 
     def _in_parts(self) -> dict[str, Self]:
         """The file with one group or device alone, where there are several."""

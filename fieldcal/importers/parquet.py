@@ -25,9 +25,8 @@ from fieldcal.importing.arrays.arrow_fields import (
 from fieldcal.importing.arrays.nested_arrow import flat_batches, flat_name
 from fieldcal.importing.files.gzip_stream import unpacked_file
 from fieldcal.importing.headings.heading import Heading
-from fieldcal.importing.read_options import ReadOptions
-from fieldcal.importing.recording import ROWS, Recording
-from fieldcal.importing.tables.column_recording import ColumnRecording
+from fieldcal.importing.recording import ROWS
+from fieldcal.importing.tables.divided_recording import DividedRecording
 from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
 from fieldcal.importing.times.name_changes import NameChanges
@@ -51,7 +50,7 @@ def recognises(head: bytes, path: Path) -> bool:
     return head.startswith((PARQUET, FEATHER, STREAM))
 
 
-class ParquetFile(ColumnRecording):
+class ParquetFile(DividedRecording):
     """A table with named columns, with one IMU in it or several.
 
     Attributes
@@ -62,23 +61,6 @@ class ParquetFile(ColumnRecording):
     """
 
     device: tuple[str, str] | None = None
-    parts_found: dict[str, Self] | None = None
-    """The file with the rows of one device alone, by its name."""
-
-    def imus(self) -> dict[str, ReadOptions]:
-        """Options of each IMU, of which each may have rows of its own."""
-        if self.imus_found is None and (parts := self._in_parts()):
-            self.imus_found = {}
-            for name, part in parts.items():
-                (wanted,) = part.imus().values()
-                self.imus_found[name] = wanted
-                part.imus_found = {name: wanted}
-                self.says += [s for s in part.says if s not in self.says]
-        return super().imus()
-
-    def alone(self, stream: str) -> Recording:
-        """The recording of one IMU, as far as it has rows of its own."""
-        return self._in_parts().get(stream) or super().alone(stream)
 
     def _in_parts(self) -> dict[str, Self]:
         """The file with the rows of one device alone, where there are several."""

@@ -55,6 +55,23 @@ def guess_acceleration(
         With a question and its answers.
 
     """
+    fits, shows = _fitting(said, gravity, acc, step)
+    _ask_about_gravity(name, said, gravity, acc if alone else acc[:0], fits, shows)
+    if len(fits) != 1:
+        ask_unit(
+            name,
+            f"{shows}, which is gravity in"
+            f" {' or '.join(map(str, fits)) or 'no usual unit'}",
+            unit_options("acc", fits, "g", gravity.size) + zero_options(said, gravity),
+        )
+    plain = (fits[0].unit, fits[0].lsb) == ("m/s^2", 1)
+    return None if plain else (fits[0], f"{fits[0]}: {shows}")
+
+
+def _fitting(
+    said: ReadOptions, gravity: GravityReading, acc: Array, step: float
+) -> tuple[list[Scale], str]:
+    """Scales by which what is read is gravity, and what shows it."""
     fits = fitting_scales(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
     fits = scales_of_decimals(fits, acc)
     shows = f"|a| at rest is {rounded_text(gravity.size, 4)}"
@@ -70,6 +87,25 @@ def guess_acceleration(
     if not fits and step and not said.no_gain:
         scales = gain_scales(step, "m/s^2", G0)
         fits = fitting_scales(gravity.size, scales, ACC_OUT[not gravity.round])
+    return fits, shows
+
+
+def _ask_about_gravity(
+    name: str,
+    said: ReadOptions,
+    gravity: GravityReading,
+    acc: Array,
+    fits: list[Scale],
+    shows: str,
+) -> None:
+    """Ask where gravity seems to be taken out; `acc` is empty of one file of several.
+
+    Raises
+    ------
+    InputError
+        With a question and its answers.
+
+    """
     if not fits and gravity.size < NO_UNIT:
         raise InputError(
             f"{name}: {shows}, less than gravity reads in any unit: it seems"
@@ -78,7 +114,7 @@ def guess_acceleration(
             f" --acc-unit g --acc-lsb {rounded_text(gravity.size)}"
         )
     whole = acc[acc.any(axis=1)] - said.acc_scale * said.zero
-    if alone and (lengths := unequal_lengths(whole)) is not None:
+    if len(acc) and (lengths := unequal_lengths(whole)) is not None:
         low, high = (rounded_text(one, 2) for one in lengths)
         ask_unit(
             name,
@@ -97,12 +133,3 @@ def guess_acceleration(
             " if it is in them, say the unit",
             unit_options("acc", fits, "g", gravity.size),
         )
-    if len(fits) != 1:
-        ask_unit(
-            name,
-            f"{shows}, which is gravity in"
-            f" {' or '.join(map(str, fits)) or 'no usual unit'}",
-            unit_options("acc", fits, "g", gravity.size) + zero_options(said, gravity),
-        )
-    plain = (fits[0].unit, fits[0].lsb) == ("m/s^2", 1)
-    return None if plain else (fits[0], f"{fits[0]}: {shows}")

@@ -73,12 +73,16 @@ def test_numbers_with_a_low_line_are_no_clock(number: str) -> None:
 @given(st.text(alphabet="0123456789-:T/. 年月日Mar,_", max_size=30))
 def test_no_text_breaks_the_reader(text: str) -> None:
     assert isinstance(is_clock(text), bool)
-    ClockText().seconds(text)
+    seconds = ClockText().seconds(text)
+    assert seconds is None or isinstance(seconds, float)
 
 
-@pytest.mark.parametrize("text", ["9999-999T10:10:10", "2026-000T99:99:99"])
-def test_days_that_no_year_has_break_nothing(text: str) -> None:
-    ClockText().seconds(text)
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("9999-999T10:10:10", None), ("2026-000T99:99:99", 99 * 3661.0)],
+)
+def test_days_that_no_year_has_break_nothing(text: str, seconds: float | None) -> None:
+    assert ClockText().seconds(text) == seconds
 
 
 def written(form: str, first: datetime, many: int, step: float) -> list[str]:

@@ -124,7 +124,7 @@ class SeriesColumns(NamedTuple):
         return f"{name} [{unit}]" if parse_unit(unit) else name
 
 
-class Series(NamedTuple):
+class ValueSeries(NamedTuple):
     """Times (n,) and values (n,), in the order of the text; its clock may be one's."""
 
     t: Array
@@ -133,7 +133,7 @@ class Series(NamedTuple):
 
 def read_series(
     lines: Iterable[str], columns: SeriesColumns
-) -> tuple[dict[str, Series], bool]:
+) -> tuple[dict[str, ValueSeries], bool]:
     """Series of a text by their names, and whether their times are those of a clock.
 
     Raises
@@ -165,10 +165,12 @@ def read_series(
         times.append(np.nan if since is None else since)
         value = row[columns.value]
         values.append(float(_with_point(value, columns.separator)) if value else np.nan)
-    return {n: Series(np.array(t), np.array(x)) for n, (t, x) in found.items()}, clocked
+    return {
+        n: ValueSeries(np.array(t), np.array(x)) for n, (t, x) in found.items()
+    }, clocked
 
 
-def arrays_of(series: dict[str, Series], time: str) -> dict[str, Array]:
+def arrays_of(series: dict[str, ValueSeries], time: str) -> dict[str, Array]:
     """Values of the axes side by side, each sensor with the times of its first axis.
 
     Parameters
@@ -177,7 +179,7 @@ def arrays_of(series: dict[str, Series], time: str) -> dict[str, Array]:
     time : what the times of each are called
 
     """
-    groups: dict[tuple[str, tuple[str, ...]], dict[str, Series]] = {}
+    groups: dict[tuple[str, tuple[str, ...]], dict[str, ValueSeries]] = {}
     for name, one in series.items():
         said = heading_meaning(name)
         if said is not None and said.kind in ("a", "g", "temperature"):

@@ -7,8 +7,8 @@ x outputs of the device and y those that were recorded, of sample n; the time co
 is -1 / ln k samples. One k makes the noise of y at rest and the decays behind turns
 (`autoregression`, `decays`). It is that of a program if (2) leaves what a device sends:
 noise that is correlated over a few samples at most, and that has no less of slow parts
-than of quick ones. White noise behind the filter can be of rounding alone, and means
-over N samples leave noise whose slow parts are missing. Source: model of this project.
+than of quick ones. White noise behind the filter can be of rounding alone. Means over N
+samples leave what is opposite N samples apart. Source: model of this project.
 """
 
 from __future__ import annotations

@@ -74,15 +74,18 @@ class TurnTracker:
     def _find_turns(self) -> Iterator[tuple[tuple[int, int], int, int]]:
         """Pairs of successive windows, with the motion between them in samples.
 
-        None next to a window on a turning rate table, nor if a channel has no rows.
+        None next to a window on a turning rate table, or in which neither angles nor
+        samples tell where the force points, nor if a channel has no rows.
         """
         rows, x = self.rows, self.rows.x
         if not rows.used.any(axis=0).all():
             return
         windows = window_bounds(self.source.block, self.source.about)
         held = np.unique(x.position)
+        force_known = x.f[first_row_of_each(x, held)].any(axis=1)
+        unusable = np.union1d(held[~force_known], x.position[x.rate.any(axis=1)])
         for p, q in zip(held[:-1].tolist(), held[1:].tolist(), strict=True):
-            if x.rate[np.isin(x.position, (p, q))].any():
+            if np.isin((p, q), unusable).any():
                 continue
             ends = int(windows[p, 1]), int(windows[q, 0])
             stretch = motion_bounds(self.source, rows, (p, q), *ends)

@@ -26,6 +26,7 @@ from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_force_rows import TurnForceRows
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.model.system.window_rows import WindowSystem
+from fieldcal.model.turns.turn_tracker import TurnTracker
 from fieldcal.session.description_file import parse_description
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
@@ -326,6 +327,17 @@ def test_turns_are_followed_to_another_state_without_the_way() -> None:
         assert np.linalg.norm(turn.closure - predicted) < 1e-4 * size + 1e-6
         largest = max(largest, float(size))
     assert largest > 1e-3
+
+
+def test_no_turn_begins_or_ends_where_the_force_points_nowhere() -> None:
+    """As in a window of unknown orientation of which no sample can be used."""
+    turns = ride("gyro_scale").fit.turns
+    assert turns is not None
+    rows = turns.tracker.rows
+    unknown = rows.x.position == 2
+    x = replace(rows.x, f=np.where(unknown[:, None], 0.0, rows.x.f))
+    tracker = TurnTracker(turns.tracker.source, replace(rows, x=x), turns.tracker.since)
+    assert [pair for pair, *_ in tracker.legs] == [(0, 1), (3, 4), (4, 5)]
 
 
 def test_the_unit_of_outputs_changes_neither_turns_nor_evidence() -> None:

@@ -34,9 +34,7 @@ from fieldcal.model.state import Term
 from fieldcal.physics.effect import Chain, Line, Scatter
 from fieldcal.physics.recording import Fault
 from fieldcal.session.description import Description
-from fieldcal.session.direction_alone import refuse_direction_alone
-from fieldcal.session.duplicate_channels import refuse_duplicate_channels
-from fieldcal.session.mixed_devices import refuse_mixed_devices
+from fieldcal.session.refused_samples import refuse_samples_of_no_imu
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +73,7 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     if about.means_only:
         return _prepared_means(block, about.in_time_order())
     _refuse_empty(block, about)
-    refuse_duplicate_channels(block)
-    refuse_direction_alone(block, about.windows)
-    refuse_mixed_devices(block, about.windows)
+    refuse_samples_of_no_imu(block, about.windows)
     about = about.in_time_order()
     about.refuse_overlap()
     known = known_terms(about.model)

@@ -14,15 +14,25 @@ from fieldcal.diagnosis.signal.chain import repair_samples
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain
 from fieldcal.session.folder import Session
+from fieldcal.session.refused_samples import refuse_samples_of_no_imu
 
 
 def repaired_session(session: Session) -> tuple[Session, tuple[str, ...]]:
-    """The session with corrected samples, and sentences about what was undone."""
+    """The session with corrected samples, and sentences about what was undone.
+
+    Raises
+    ------
+    InputError
+        If samples to be corrected are not those of one IMU: corrected, they would no
+        longer show it.
+
+    """
     if not session.positions:
         return session, ()
     block, faults = repair_samples(session.block, session.about)
     if not faults:
         return session, ()
+    refuse_samples_of_no_imu(session.block, session.about.windows)
     right = replace(session, warnings=())
     right.__dict__["block"] = block
     effects = catalogue()

@@ -29,10 +29,8 @@ from fieldcal.physics.grid_stretches import (
 )
 from fieldcal.physics.recording import Grids
 from fieldcal.session.description import Description
-from fieldcal.session.direction_alone import refuse_direction_alone
-from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 from fieldcal.session.folder import Session
-from fieldcal.session.mixed_devices import refuse_mixed_devices
+from fieldcal.session.refused_samples import refuse_samples_of_no_imu
 from fieldcal.windows import Average, LearnedNoise
 from fieldcal.windows.dead_axis import DeadSensor, dead_sensors, without_dead_axes
 from fieldcal.windows.noise import converter_noise
@@ -91,9 +89,7 @@ def usable_windows(session: Session) -> UsableWindows:
     session.about.refuse_overlap()
     if session.about.means_only:
         return _windows_of_means(session)
-    refuse_duplicate_channels(session.block)
-    refuse_direction_alone(session.block, session.about.windows)
-    refuse_mixed_devices(session.block, session.about.windows)
+    refuse_samples_of_no_imu(session.block, session.about.windows)
     dead = dead_sensors(session.block.acc, session.block.gyr)
     warnings = list(session.warnings)
     living = without_dead_axes(session.block, dead)

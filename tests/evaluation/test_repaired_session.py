@@ -13,6 +13,7 @@ from session_folders import CALM, WIDE, places, recorded, write_session
 from fieldcal.calibration import limits
 from fieldcal.cli import main
 from fieldcal.commands.run_results import solve_and_decide
+from fieldcal.core.errors import InputError
 from fieldcal.evaluation.repaired_session import repaired_session
 from fieldcal.history.store import History
 from fieldcal.session.folder import RESULT, Session
@@ -40,6 +41,16 @@ def test_samples_are_those_of_the_device_without_the_program(folder: Path) -> No
     still = np.abs(right.block.six - plain.six)[plain.t > plain.t[-1] - 5.0]
     noise = np.diff(plain.six, axis=0).std(axis=0)
     assert (still.mean(axis=0) < 0.05 * noise).all()
+
+
+def test_a_direction_is_refused_before_its_filter_is_undone(folder: Path) -> None:
+    """Without the filter its magnitudes differ, as those of accelerometers do."""
+    session = Session.open(folder)
+    acc = session.block.acc
+    up = 9.80665 * acc / np.linalg.norm(acc, axis=1, keepdims=True)
+    session.__dict__["block"] = replace(session.block, acc=up)
+    with pytest.raises(InputError, match=r"magnitude 9\.80665 .* direction of gravity"):
+        repaired_session(session)
 
 
 def test_a_session_without_faults_is_the_same(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
     ]
     quality = _quality(explanation, lost, first, then)
     words = paragraph(
-        verdict, effects, mismatch, strange, quality, explanation,
+        verdict, effects, mismatch, strange, quality,
         notes(explanation, undetermined_parameters(explanation)), odd,
     )  # fmt: skip
     return Diagnosis(

@@ -124,11 +124,24 @@ def _errors(explanation: Explanation, group: Group) -> AngleErrors:
 
 
 def list_positions(positions: Sequence[int], most: int | None = None) -> str:
-    """Name positions by their numbers, counted from 1; at most `most` of them.
+    """Name positions by their numbers, from 1; three or more in a row as a span.
 
-    >>> list_positions([3]), list_positions([0, 1, 2], most=2)
+    Of single ones and spans at most `most` are named.
+
+    >>> list_positions([3]), list_positions([0, 1, 4, 6], most=2)
     ('position 4', 'positions 1, 2…')
+    >>> list_positions([0, 1, 2, 3, 7, 9, 10])
+    'positions 1 to 4, 8, 10, 11'
     """
     word = "position" if len(positions) == 1 else "positions"
-    listed = ", ".join(str(index + 1) for index in positions[:most])
-    return f"{word} {listed}" + "…" * (most is not None and len(positions) > most)
+    rows = np.split(positions, 1 + np.flatnonzero(np.diff(positions) != 1))
+    named = [
+        part
+        for row in rows
+        for part in (
+            [f"{row[0] + 1} to {row[-1] + 1}"]
+            if len(row) > 2
+            else [str(index + 1) for index in row]
+        )
+    ]
+    return f"{word} {', '.join(named[:most])}" + "…" * (len(named[:most]) < len(named))

@@ -58,7 +58,6 @@ def paragraph(
     mismatch: Sequence[Mismatch],
     unknown: Sequence[UnknownMismatch],
     quality: tuple[Quality, Quality, str],
-    explanation: Explanation,
     notes: Sequence[str],
     odd: Sequence[str] = (),
 ) -> str:
@@ -68,7 +67,8 @@ def paragraph(
     """
     out = [_wrong_description(odd)] if odd else []
     if mismatch or not odd:
-        out.append(_opening(verdict, effects, mismatch))
+        unexplained = [u.mismatch for u in unknown] or mismatch
+        out.append(_opening(verdict, effects, unexplained))
     out += [_how_random(f) for f in effects if _is_random(f)]
     if verdict in ("left_out", "ambiguous") and effects:
         out += _improvement(*quality)
@@ -85,7 +85,7 @@ def _wrong_description(odd: Sequence[str]) -> str:
 
 
 def _opening(
-    verdict: Verdict, effects: Sequence[FoundEffect], mismatch: Sequence[Mismatch]
+    verdict: Verdict, effects: Sequence[FoundEffect], unexplained: Sequence[Mismatch]
 ) -> str:
     listed = _listed(effects)
     if verdict == "consistent":
@@ -97,7 +97,7 @@ def _opening(
         return f"The simulation leaves out {listed}."
     if verdict == "ambiguous":
         return f"Something is left out, and it may be {listed}." if effects else ""
-    where = _places(mismatch)
+    where = _places(unexplained)
     omitted = f" Besides, it leaves out {listed}." if listed else ""
     return (
         "Recording and simulation differ, and no effect in the catalogue explains it"
@@ -118,9 +118,15 @@ def _listed(effects: Sequence[FoundEffect]) -> str:
 
 
 def _places(mismatch: Sequence[Mismatch]) -> str:
-    """Where they differ, the largest difference first."""
+    """Where they differ, the largest difference first, and in which outputs."""
     clearest = sorted(mismatch, key=lambda m: -m.sigma)
-    places = list(dict.fromkeys(f"{m.channel}, {_where(m)}" for m in clearest))
+    channels: dict[str, list[str]] = {}
+    for m in clearest:
+        channels.setdefault(_where(m), []).append(m.channel)
+    places = [
+        f"{join_words(list(dict.fromkeys(off)))}, {where}"
+        for where, off in channels.items()
+    ]
     more = len(places) - thresholds.MAX_LISTED_PLACES
     return "; ".join(places[: thresholds.MAX_LISTED_PLACES]) + (
         f"; {more} more places" if more > 0 else ""
@@ -129,7 +135,8 @@ def _places(mismatch: Sequence[Mismatch]) -> str:
 
 def _where(m: Mismatch) -> str:
     places = list_positions(m.positions, thresholds.MAX_LISTED_PLACES)
-    return f"{places}, {m.from_s:.0f} to {m.to_s:.0f} s"
+    digits = 0 if m.to_s - m.from_s > 10.0 else 1
+    return f"{places}, at {m.from_s:.{digits}f} to {m.to_s:.{digits}f} s"
 
 
 def _is_random(effect: FoundEffect) -> bool:

@@ -113,19 +113,29 @@ def _beside_tremor(
 ) -> SpectralLine | None:
     """The line, if it stands out of the tremor of some outputs at its frequency.
 
-    The noise of each output is the scatter between its windows. Since it is estimated
-    from few windows, the gain is that of Student's t distribution with n degrees of
-    freedom, n / 2 ln(1 + chi2 / n) in place of chi2 / 2.
+    An output whose waves keep no phase is as noisy as they scatter between windows; the
+    others have the noise that they have. Since a scatter is estimated from few windows,
+    the gain by it is that of Student's t distribution with n degrees of freedom,
+    n / 2 ln(1 + chi2 / n) in place of chi2 / 2.
     """
     if len(moments.counts) < 2:
         return None
-    scatter = _scatter_between_windows(pieces, tone, moments)
-    noisy = replace(pieces, noise=np.maximum(pieces.noise, scatter))
-    best = _best_effect(noisy, moments.near, moments)
-    if best is None or _coherent_part(noisy, best, moments) <= thresholds.ONE_LINE:
-        return None
-    n = 2 * (len(moments.counts) - 1) * len(best.channels)
-    less = best.chi2 / 2 - n / 2 * np.log1p(best.chi2 / n)
+    heard, best = pieces, tone
+    trembles = np.zeros(len(pieces.noise), dtype=bool)
+    while _coherent_part(heard, best, moments) <= thresholds.ONE_LINE:
+        if trembles[best.clear_channels].all():
+            return None
+        trembles[best.clear_channels] = True
+        scatter = _scatter_between_windows(pieces, best, moments)
+        noise = np.where(trembles, np.maximum(pieces.noise, scatter), pieces.noise)
+        heard = replace(pieces, noise=noise)
+        if (again := _best_effect(heard, moments.near, moments)) is None:
+            return None
+        best = again
+    by_tremor = [c for c in best.clear_channels if trembles[c]]
+    n = 2 * (len(moments.counts) - 1) * max(len(by_tremor), 1)
+    chi2 = float(_explained(heard, best, moments)[by_tremor].sum())
+    less = chi2 / 2 - n / 2 * np.log1p(chi2 / n)
     return best if best.gain - less > _least_gain(pieces) else None
 
 
@@ -158,6 +168,13 @@ def _deviations_from_line(
     """Amplitudes of the windows, and their deviations from one steady line."""
     measured = moments.amplitudes(np.array([tone.hz - moments.near]))[0]
     return measured, measured - tone.amplitudes(pieces.x)
+
+
+def _explained(pieces: WindowSamples, tone: SpectralLine, moments: Moments) -> Array:
+    """Decrease of the whitened squares of each output by a line, (6,)."""
+    measured, off = _deviations_from_line(pieces, tone, moments)
+    fallen: Array = moments.counts @ (np.abs(measured) ** 2 - np.abs(off) ** 2) / 2
+    return fallen / pieces.noise**2
 
 
 def _scatter_between_windows(

@@ -86,7 +86,9 @@ def samples_of_windows(source: RowSource, rows: Rows) -> WindowSamples:
     samples, usable = [], []
     for (row, a, b), t in zip(held, times, strict=True):
         values = np.hstack([block.acc[a:b], block.gyr[a:b]])
-        usable.append(source.usable[a:b] & rows.used[row] & np.isfinite(values))
+        # rows of one window may be for the accelerometers or the gyroscopes alone
+        use = rows.used[rows.x.position == rows.x.position[row]].any(axis=0)
+        usable.append(source.usable[a:b] & use & np.isfinite(values))
         samples.append(_detrended(t, values, usable[-1], cuts))
     return WindowSamples(
         experience_in_windows(rows, held), tuple(samples), times, rows.noise,

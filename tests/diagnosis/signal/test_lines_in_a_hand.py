@@ -39,15 +39,15 @@ def held(seed: int) -> tuple[Array, Array]:
     return t, six
 
 
-def lines(t: Array, six: Array) -> list[SpectralLine]:
-    """What is found."""
+def lines(t: Array, six: Array, apart: bool = False) -> list[SpectralLine]:
+    """What is found; `apart` states that gyroscopes have rows of their own."""
     starts = np.arange(COUNT) * REST_S + 1.0
     said = [{"start_s": s, "end_s": s + HELD_S} for s in starts.tolist()]
     about = parse_description({"format": 1, "position": said})
     block = Block.of(t, six[:, :3], six[:, 3:])
     usable = np.ones((len(t), 6), dtype=bool)
     source = RowSource(block, about, usable, starts, Thermometer.of(block))
-    return [tone for tone, _ in find_lines(source, reduce_to_rows(source))]
+    return [tone for tone, _ in find_lines(source, reduce_to_rows(source, apart=apart))]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -66,3 +66,12 @@ def test_a_line_is_found_in_outputs_that_do_not_tremble(hz: float) -> None:
     assert abs(tone.hz - hz) < 1e-3 and tone.channels == ("ax", "ay")
     found = np.array([tone.values["ax"], tone.values["ay"]])
     assert np.abs(found - np.abs(size)).max() < 4 * sigma
+
+
+def test_a_line_of_gyroscopes_is_found_in_rows_of_their_own() -> None:
+    """The first rows of each window are for the accelerometers alone."""
+    t, six = held(5)
+    six[:, 4] += 0.3 * NOISE[4] * np.cos(2 * np.pi * 31.0 * t)
+    for apart in (False, True):
+        (tone,) = lines(t, six, apart)
+        assert abs(tone.hz - 31.0) < 1e-3 and tone.channels == ("gy",)

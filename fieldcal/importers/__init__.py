@@ -17,7 +17,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.drivers import codec
-from fieldcal.importing.files.gzip_stream import first_bytes
+from fieldcal.importing.files.packed_stream import first_bytes
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.recording import Recording
 

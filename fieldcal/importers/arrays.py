@@ -36,7 +36,7 @@ from fieldcal.importing.arrays.array_tables import (
 from fieldcal.importing.arrays.device_rows import device_rows
 from fieldcal.importing.arrays.matlab_objects import holds_objects, object_tables
 from fieldcal.importing.arrays.paired_tables import ArrayPairing, pair_arrays
-from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
+from fieldcal.importing.files.packed_stream import first_bytes, unpacked_file
 from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.tables.divided_recording import DividedRecording
 from fieldcal.importing.times.said_rate import named_scalars, stated_rate

@@ -21,7 +21,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block
-from fieldcal.importing.files.gzip_stream import unpacked_file
+from fieldcal.importing.files.packed_stream import unpacked_file
 from fieldcal.importing.recording import ImuStream, Recording
 
 WHAT = "blackbox of Betaflight, INAV: .bbl, .bfl"

@@ -21,7 +21,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.options import Options
-from fieldcal.importing.files.gzip_stream import first_bytes, open_unpacked
+from fieldcal.importing.files.packed_stream import first_bytes, open_unpacked
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.clock_text import ClockText
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.files.gzip_stream import unpacked_file
+from fieldcal.importing.files.packed_stream import unpacked_file
 from fieldcal.importing.messages.mcap_messages import (
     Decoders,
     QuietDecoders,

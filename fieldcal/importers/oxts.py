@@ -15,7 +15,7 @@ from pathlib import Path
 from fieldcal.core.errors import InputError
 from fieldcal.importers import TIMES
 from fieldcal.importers.csv_like import TextColumns
-from fieldcal.importing.files.gzip_stream import PIECE
+from fieldcal.importing.files.packed_stream import PIECE
 
 WHAT = "folders of OXTS samples, as KITTI has them"
 

@@ -23,7 +23,7 @@ from fieldcal.importing.arrays.arrow_fields import (
     may_name_devices,
 )
 from fieldcal.importing.arrays.nested_arrow import flat_batches, flat_name
-from fieldcal.importing.files.gzip_stream import unpacked_file
+from fieldcal.importing.files.packed_stream import unpacked_file
 from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.recording import ROWS
 from fieldcal.importing.tables.divided_recording import DividedRecording

@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
+from fieldcal.importing.files.packed_stream import first_bytes, unpacked_file
 from fieldcal.importing.messages.ros_messages import (
     IMU,
     TEMPERATURE,

@@ -15,7 +15,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.importers.arrays import ArrayFile
 from fieldcal.importing.arrays.array_groups import arrays_in_group
 from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
-from fieldcal.importing.files.gzip_stream import PIECE, unpacked_pieces
+from fieldcal.importing.files.packed_stream import PIECE, unpacked_pieces
 from fieldcal.importing.files.text_encoding import as_utf8, is_mostly_text
 from fieldcal.importing.records.sensor_blocks import (
     SENSOR,

@@ -21,7 +21,7 @@ from fieldcal.importers.arrays import ArrayFile
 from fieldcal.importers.rosbag import SQLITE, TOPICS
 from fieldcal.importing.arrays.array_groups import arrays_in_group
 from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
-from fieldcal.importing.files.gzip_stream import unpacked_file
+from fieldcal.importing.files.packed_stream import unpacked_file
 from fieldcal.importing.text.instances import MAX_NAMED, MIN_ROWS
 from fieldcal.importing.times.clock_text import ClockText, is_clock
 from fieldcal.importing.times.name_changes import NameChanges

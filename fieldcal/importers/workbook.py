@@ -14,7 +14,7 @@ from typing import Any, Self
 
 from fieldcal.core.errors import InputError
 from fieldcal.importers.csv_like import TextColumns
-from fieldcal.importing.files.gzip_stream import PIECE, OnTruncation, unpacked_file
+from fieldcal.importing.files.packed_stream import PIECE, OnTruncation, unpacked_file
 
 WHAT = "workbooks of spreadsheets"
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.files.gzip_stream import PIECE, unpacked_pieces
+from fieldcal.importing.files.packed_stream import PIECE, unpacked_pieces
 from fieldcal.importing.read_options import ReadOptions
 
 ROWS = 1 << 15

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
+import lzma
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +19,7 @@ from small_files import SMALL, Small, whole
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.files.gzip_stream import unpacked_pieces
+from fieldcal.importing.files.packed_stream import unpacked_pieces
 from fieldcal.session.folder import Session
 
 NO_STREAM = ("arrays", "parquet", "phone_zip", "workbook", "sqlite_log", "octave_text",
@@ -56,6 +59,18 @@ def test_of_a_packed_log_that_was_cut_off_what_is_whole_is_taken(
         begins(found, small.expected)
         most = max(most, len(found))
     assert most >= len(small.expected) - 1
+
+
+@pytest.mark.parametrize("compress", [bz2.compress, lzma.compress])
+@pytest.mark.parametrize("name", ["csv_like", "rosbag", "sqlite_log"])
+def test_a_log_is_read_however_it_is_packed(
+    tmp_path: Path, name: str, compress: Callable[[bytes], bytes]
+) -> None:
+    """As a stream, and where a format has to be searched."""
+    small = Small(name, tmp_path / "file")
+    small.path.write_bytes(compress(small.content))
+    found = whole(small.path, small.wanted, name)
+    np.testing.assert_array_equal(found.six, small.expected.six)
 
 
 @pytest.mark.parametrize("ending", [".asc", ".blf", ".trc"])
@@ -154,13 +169,19 @@ def test_a_damaged_chunk_of_an_mcap_file_costs_no_other(
     assert len(expected) - 30 < len(found) < len(expected)
 
 
-def test_files_of_several_packed_parts_and_padding(tmp_path: Path) -> None:
-    path = tmp_path / "log.gz"
+@pytest.mark.parametrize("compress", [gzip.compress, bz2.compress, lzma.compress])
+def test_files_of_several_packed_parts_and_padding(
+    tmp_path: Path, compress: Callable[[bytes], bytes]
+) -> None:
+    path = tmp_path / "log.packed"
     parts = [bytes([n]) * 70_000 for n in range(1, 4)]
-    packed = bytes(200_000).join(map(gzip.compress, parts))
+    packed = bytes(200_000).join(map(compress, parts))
     path.write_bytes(packed + bytes(100))
     assert b"".join(unpacked_pieces(path)) == b"".join(parts)
-    for wrong, says in ((packed + b"more", "cannot be unpacked"), (packed[:-9], "cut")):
+    for wrong, says in (
+        (packed + b"nothing packed", "cannot be unpacked"),
+        (packed[:-9], "cut"),
+    ):
         path.write_bytes(wrong)
         with pytest.raises(InputError, match=says):
             list(unpacked_pieces(path))

@@ -9,7 +9,7 @@ import pytest
 from laid_about import turned
 
 from fieldcal.cli import main
-from fieldcal.importing.files.gzip_stream import PIECE
+from fieldcal.importing.files.packed_stream import PIECE
 from fieldcal.session.folder import Session
 
 ROWS = turned(5, 50.0, 2.0)

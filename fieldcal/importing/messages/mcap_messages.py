@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fieldcal.core.errors import InputError
-from fieldcal.importing.files.gzip_stream import OnTruncation
+from fieldcal.importing.files.packed_stream import OnTruncation
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Message, Schema

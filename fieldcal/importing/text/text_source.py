@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from zipfile import BadZipFile, ZipFile
 
 from fieldcal.core.errors import InputError
-from fieldcal.importing.files.gzip_stream import PIECE, unpacked_pieces
+from fieldcal.importing.files.packed_stream import PIECE, unpacked_pieces
 from fieldcal.importing.files.text_encoding import as_utf8
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.text.text_form import TextForm

@@ -94,8 +94,10 @@ class SeriesColumns(NamedTuple):
         bare = [re.sub(r"[\W_]+", "", cell.lower()) for cell in head]
         value = [i for i, name in enumerate(bare) if name in VALUES]
         named = [i for i, name in enumerate(bare) if name in SERIES]
+        if len(value) != 1 or not named:
+            return None
         times = [i for i, cell in enumerate(head) if _is_time(cell)]
-        if len(value) != 1 or not (named and times):
+        if not times:
             return None
         devices = [
             i

@@ -31,6 +31,11 @@ MANY = 1000.0
 
 _DIGIT = re.compile(r"\s*[-+]?\d")
 
+_GROUP = {
+    sign: re.compile(rf"{re.escape(sign)}(?<=\d.)\d{{3}}(?!\d)") for sign in SIGNS
+}
+"""A sign behind a digit, and a group of three digits: signs are few, digits many."""
+
 
 class GroupedDigits(TextForm):
     """Columns of whole numbers whose thousands are parted.
@@ -53,7 +58,10 @@ class GroupedDigits(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if a column has such numbers."""
-        if not lines:
+        text = "\n".join(lines)
+        # most texts have none anywhere, which is seen sooner than cell by cell
+        may = [s for s in SIGNS if len(_GROUP[s].findall(text)) >= FEWEST]
+        if not may:
             return None
         old = separator or find_separator(re.sub('"[^"]*"', '""', lines[-1]))
         if old is None:
@@ -61,7 +69,7 @@ class GroupedDigits(TextForm):
         rows = [split_quoted(line, old) for line in lines]
         width = len(rows[-1])
         columns = [*zip(*(row for row in rows if len(row) == width), strict=True)]
-        found = {i: _sign(column) for i, column in enumerate(columns)}
+        found = {i: _sign(column, may) for i, column in enumerate(columns)}
         signs = {i: sign for i, sign in found.items() if sign}
         quoted = any('"' in line for line in lines)
         return (
@@ -81,15 +89,15 @@ class GroupedDigits(TextForm):
         return lambda lines: [one(line) for line in lines]
 
 
-def _sign(cells: Sequence[str]) -> str:
-    """What parts the thousands of the numbers of a column; "" if nothing does.
+def _sign(cells: Sequence[str], signs: Sequence[str] = SIGNS) -> str:
+    """Which sign parts the thousands of the numbers of a column; "" if none does.
 
     >>> _sign(["t", "980", "990", "998", "1,000", "1,010", "1,020"])
     ','
     >>> _sign(["9.812", "9.790", "9.833", "0.120"]), _sign(["1'000'000"] * 3)
     ('', "'")
     """
-    for sign in SIGNS:
+    for sign in signs:
         groups = [_groups(cell, sign) for cell in cells]
         grouped = sum(map(bool, groups))
         if grouped < FEWEST:
@@ -109,9 +117,9 @@ def _groups(cell: str, sign: str) -> int:
     >>> [_groups(cell, ",") for cell in ("1,714,746", "-16,384", "0,123", "16384")]
     [2, 1, 0, 0]
     """
-    first, *others = cell.strip().lstrip("+-").split(sign)
-    if not others:
+    if sign not in cell:
         return 0
+    first, *others = cell.strip().lstrip("+-").split(sign)
     *whole, last = others
     decimals = re.fullmatch(r"(\d{3})(?:[.,]\d+)?", last)
     begins = re.fullmatch(r"[1-9]\d{0,2}", first) is not None

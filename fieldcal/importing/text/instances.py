@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -237,8 +238,9 @@ def _rows_of(
     above: list[list[str]] = []
     for row in rows:
         if len(row) == len(rows[-1]):
-            values = sum(is_number(cell, separator != ",") for cell in row)
-            (numbers if values > 1 else above).append(row)
+            values = (cell for cell in row if is_number(cell, separator != ","))
+            several = len([*islice(values, 2)]) > 1
+            (numbers if several else above).append(row)
     return numbers, above
 
 

@@ -66,12 +66,12 @@ class SensorCodes(TextForm):
         parted = separator or (seen.most_common(1)[0][0] if seen else None)
         rows = [split_cells(line.lstrip("#%/ "), parted) for line in lines]
         width = len(rows[-1]) if rows else 0
-        numbers = [row for row in rows if len(row) == width and _all_numbers(row)]
         above = [row for row in rows if _is_named(row, width)]
-        if not numbers or not above:
-            return None
-        names = above[-1][:width]
+        names = above[-1][:width] if above else []
         places = [i for i, name in enumerate(names) if _tells_sensors(name)]
+        if not places:
+            return None
+        numbers = [row for row in rows if len(row) == width and _all_numbers(row)]
         for i in places:
             words = _words(lines, numbers, i)
             if words and not _several_devices(names, numbers, places):

@@ -205,7 +205,14 @@ class TextColumns(ColumnRecording):
 
     @cached_property
     def _lines(self) -> list[str]:
+        if self._in_turn is None:
+            return self._first_lines
         return next((top_lines(data) for data in self._pieces()), [])
+
+    @cached_property
+    def _first_lines(self) -> list[str]:
+        """Lines at the top in columns, of all IMUs."""
+        return next((top_lines(d) for d in self._text.pieces(self._forms)), [])
 
     @cached_property
     def _numbers(self) -> Array:
@@ -289,10 +296,9 @@ class TextColumns(ColumnRecording):
     @cached_property
     def _in_turn(self) -> ImuInstances | None:
         """What tells several IMUs apart whose rows come in turn."""
-        first = next((top_lines(d) for d in self._text.pieces(self._forms)), [])
         parted = self.wanted.separator
-        found = find_instances(first, parted)
-        ways = [found] if found is not None else named_columns(first, parted)
+        found = find_instances(self._first_lines, parted)
+        ways = [found] if found else named_columns(self._first_lines, parted)
         whole = (
             one.over(map(split_lines, self._text.pieces(self._forms))) for one in ways
         )

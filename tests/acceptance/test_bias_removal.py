@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import norm
 
 from fieldcal.acceptance.bias_cases import DEPENDENCE, BiasSpread
@@ -14,7 +15,7 @@ from fieldcal.acceptance.bias_removal import (
     TRACKING,
     bias_removal_probability,
 )
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Average
 
 NOISE, RATE = 5e-4, 100.0
@@ -36,11 +37,8 @@ def at_rest(
     for k in range(6):
         one = bias + NOISE * rng.standard_normal((COUNT, 3))
         one[:, k % 3] += earth * (-1) ** (k // 3)
-        keep = np.exp(-1 / RATE / tracks_s) if tracks_s else 0.0
-        mean = np.full(3, bias + NOISE)
-        for i in range(COUNT if tracks_s else 0):
-            mean = keep * mean + (1 - keep) * one[i]
-            one[i] -= mean
+        if tracks_s:
+            one -= running_mean(one, np.full(3, bias + NOISE), tracks_s)
         gyr.append(one)
     block = Block.of(
         np.arange(6 * COUNT) / RATE, np.zeros((6 * COUNT, 3)), np.concatenate(gyr)
@@ -50,6 +48,14 @@ def at_rest(
         for k in range(6)
     ]
     return windows, block
+
+
+def running_mean(rates: Array, begins: Array, seconds: float) -> Array:
+    """The mean over some seconds, (n, 3), that was another one before."""
+    keep = np.exp(-1 / RATE / seconds)
+    found, _ = lfilter([1 - keep], [1, -keep], rates, axis=0, zi=keep * begins[None])
+    mean: Array = found
+    return mean
 
 
 def test_a_bias_or_the_earths_rate_stands_out() -> None:
@@ -284,11 +290,9 @@ def turned(
         moves[first + COUNT + pause // 4 : first + COUNT + 3 * pause // 4] = True
         windows.append((first, first + COUNT))
     gyr[moves] += 0.3
-    keep, followed = np.exp(-1 / RATE / tau), gyr[0].copy()
-    for i in range(total):
-        if not moves[i]:
-            followed = keep * followed + (1 - keep) * gyr[i]
-        gyr[i] -= followed if np.isfinite(tau) else 0.0
+    if np.isfinite(tau):
+        rests = np.cumsum(~moves) - 1  # the last sample at rest
+        gyr -= running_mean(gyr[~moves], gyr[0], tau)[rests]
     if away_s:
         gyr[windows[3][0] :] += REPEAT * rng.standard_normal(3)
         t[windows[3][0] - pause // 2 :] += away_s

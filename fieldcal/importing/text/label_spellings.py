@@ -34,6 +34,7 @@ EPOCH_DAY = date(1970, 1, 1).toordinal()
 MAX_UNIT_LETTERS = 18
 """Letters of a unit; what is longer is a sentence."""
 
+_BRACKET = re.compile(r"[\[\](){}<>]")
 _LIST = re.compile(rf"(?<=[:=])\s*[\[({{<]\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*[\])}}>]")
 _LISTED = re.compile(
     rf"(\([^()]*\)|[A-Za-z])\s*(?:\[\s*({NUMBER}(?:[\s,;]+{NUMBER})*)\s*\]"
@@ -127,15 +128,20 @@ def plain_labels(line: str) -> str:
     >>> plain_labels("t: 0:00:05.25, at: 2024-05-03T14:20:31.5")
     't: 5.250000, at: 1714746031.500000'
     """
-    line = _CONVERTED.sub(_in_unit, _ADDRESS.sub("", line))
-    line = _CLOCK.sub(_in_seconds, _REMARK.sub("", line))
-    line = _FROM_AXIS.sub(r"\1 ", _WITH_UNIT.sub(_unit_apart, line))
-    line = _NAMES.sub(_pairs, line)
-    line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
+    # most lines of a long log have none
+    bracketed = _BRACKET.search(line) is not None
+    if bracketed:
+        line = _CONVERTED.sub(_in_unit, _ADDRESS.sub("", line))
+        line = _WITH_UNIT.sub(_unit_apart, _REMARK.sub("", line))
+        line = _FROM_AXIS.sub(r"\1 ", line)
+    line = _NAMES.sub(_pairs, _CLOCK.sub(_in_seconds, line))
+    if bracketed:
+        line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
     line = _SPACED.sub(r"\1: \2 \3: \4 \5: \6", line)
     line = _OVER_AXES.sub(r"\1:", line)
-    line = _BEHIND.sub(_bare_unit, line)
-    line = _LISTED.sub(lambda said: f"{said[1]}: {said[2] or said[3]}", line)
+    if bracketed:
+        line = _BEHIND.sub(_bare_unit, line)
+        line = _LISTED.sub(lambda said: f"{said[1]}: {said[2] or said[3]}", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
     three = _THREE.fullmatch(line)
     line = (

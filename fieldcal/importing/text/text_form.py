@@ -51,8 +51,13 @@ class TextForm(ABC):
 
 
 def is_true_of_most(lines: Sequence[str], is_so: Callable[[str], bool]) -> bool:
-    """Whether a condition is true of most lines."""
-    return sum(map(is_so, lines)) > MOSTLY * len(lines)
+    """Whether a condition is true of most lines, looking at no more than it takes."""
+    wanted, found = MOSTLY * len(lines), 0
+    for behind, line in zip(reversed(range(len(lines))), lines, strict=True):
+        found += is_so(line)
+        if found > wanted or found + behind <= wanted:
+            break
+    return found > wanted
 
 
 def take_row(row: dict[str, str], names: Sequence[str], separator: str) -> str:

@@ -3,11 +3,12 @@
 And what many need, and nobody wants to wait for twice.
 """
 
+import gc
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,19 @@ def pytest_configure(config: pytest.Config) -> None:
     """Take as many examples of each property as usual, if all is wanted."""
     if config.getoption("--all"):
         settings.load_profile("all")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Look for no garbage among the tests: all of them stay to the end."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        # what a test leaves is little: it may lie for longer
+        gc.set_threshold(20_000)
+        gc.enable()
 
 
 def pytest_collection_modifyitems(

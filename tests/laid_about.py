@@ -12,11 +12,15 @@ G = 9.80665
 SIDES = [(0, 0, 1), (0, 1, 0), (0, 0, -1), (1, 0, 0), (0, -1, 0), (-1, 0, 0), (0, 0, 1)]
 
 
-def turned(seed: int, rate: float, hold: float = 3.0) -> Array:
-    """Rows t, a, w of a device that is laid on each of its sides in turn, SI."""
+def turned(seed: int, rate: float, hold: float = 3.0, sides: int = 5) -> Array:
+    """Rows t, a, w of a device that is laid on some of `SIDES` in turn, SI.
+
+    Five have every axis along gravity once, and turn about two; all seven have each
+    axis up and down.
+    """
     rng = np.random.default_rng(seed)
     up, rows = np.array(SIDES[0], float), []
-    for side in SIDES:
+    for side in SIDES[:sides]:
         axis, steps = np.cross(up, side), int(1.5 * rate)
         angle = (1 - np.cos(np.pi * (np.arange(steps) + 0.5) / steps)) * np.pi / 4
         speed = np.gradient(angle, 1 / rate)

@@ -13,10 +13,10 @@ import numpy as np
 from laid_about import G, turned
 
 from fieldcal.cli import main
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Block
 from fieldcal.session.folder import Session
 
-ROWS = turned(5, 50.0, 2.0)
+ROWS = turned(5, 50.0, 1.2, sides=7)
 
 
 T, A, W = ROWS[:, 0], ROWS[:, 1:4], ROWS[:, 4:]
@@ -396,7 +396,10 @@ def imported(path: Path, *more: str) -> Path:
 
 
 def assert_same(folder: Path, per_row: float = 0.02, tolerance: float = 1e-3) -> None:
-    block = Session.open(folder).block
+    assert_rows(Session.open(folder).block, per_row, tolerance)
+
+
+def assert_rows(block: Block, per_row: float = 0.02, tolerance: float = 1e-3) -> None:
     n = len(block)
     # the last of two sensors in turn may be alone
     assert len(T) - 2 <= n <= len(T)

@@ -22,7 +22,7 @@ def answers(tmp_path: Path, silent: list[int], code: int = 0) -> tuple[Any, Any]
 
     `code` is what solve is to end with.
     """
-    rows = turned(1, 25.0, hold=6.0)
+    rows = turned(1, 25.0, hold=6.0, sides=7)
     rows[:, 1 + np.array(silent)] = 0.0
     log, folder = write(tmp_path, rows, heading=HEADING), tmp_path / "s"
     assert main(["import", str(log), "--gyr-unit", "rad/s", "-o", str(folder)]) == 0

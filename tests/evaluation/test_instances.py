@@ -60,7 +60,7 @@ def test_a_single_rest_tells_no_uncertainty() -> None:
 def test_import_says_at_once_which_imu_is_out_and_so_does_compare(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = turned(1, 50.0)
+    rows = turned(1, 50.0, sides=7)
     low = rows[:, 1:].copy()
     low[:, :3] *= 0.95
     names = [f"{imu}_{kind}{axis}" for imu in ("mid", "low", "top") for kind in "ag"

@@ -20,7 +20,7 @@ SAYING = b"booting, please wait\r\n" * 400
 
 def stream(wire: str) -> tuple[bytes, Array]:
     """Bytes of a device that is laid on each of its sides, and its samples."""
-    rows = turned(1, RATE)
+    rows = turned(1, RATE, sides=7)
     n = len(rows)
     warm, seq = np.full(n, 25.0), np.arange(n, dtype=float)
     block = Block.of(rows[:, 0], rows[:, 1:4], rows[:, 4:], warm, seq)

@@ -336,7 +336,7 @@ def clocks(rows: Array) -> dict[str, Array]:
 def test_rows_that_share_a_time_are_spread_evenly(
     tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = turned(6, 50.0)
+    rows = turned(6, 50.0, sides=7)
     shared = np.column_stack([clocks(rows)[kind], rows[:, 1:]])
     path = write(tmp_path, shared, heading="time,ax,ay,az,gx,gy,gz")
     session = imported(path)

@@ -138,10 +138,11 @@ def test_a_device_with_hardly_a_row_is_left_out_and_said(
 
 def test_a_few_rows_of_another_device_spoil_none(tmp_path: Path) -> None:
     path, out = tmp_path / "log.csv", tmp_path / "out"
+    own = turned(21, 50.0, 2.0, sides=7)  # more lines than those at the top
     stray = as_text(np.full(5, 8.0), OTHER[:5]).split("\n", 1)[1]
-    path.write_text(as_text(np.full(len(ONE), 7.0), ONE) + stray)
+    path.write_text(as_text(np.full(len(own), 7.0), own) + stray)
     assert main(["import", str(path), "-o", str(out)]) == 0
-    np.testing.assert_allclose(Session.open(out).block.acc, ONE[:, 1:4], atol=1e-6)
+    np.testing.assert_allclose(Session.open(out).block.acc, own[:, 1:4], atol=1e-6)
 
 
 @pytest.mark.parametrize(

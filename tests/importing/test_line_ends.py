@@ -11,7 +11,7 @@ from laid_about import turned, write
 
 from fieldcal.core.errors import InputError
 
-ROWS = turned(13, 50.0, 1.0)
+ROWS = turned(13, 50.0, 1.0, sides=7)
 HEAD = "t,ax,ay,az,gx,gy,gz"
 
 

@@ -15,7 +15,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importers.octave_text import read_variables
 
-ROWS = turned(51, 50.0, 2.0)
+ROWS = turned(51, 50.0, 2.0, sides=7)
 TOP = "# Created by Octave 6.4.0, Mon Jan 05 12:00:00 2026 UTC <me@pc>\n"
 
 

@@ -66,7 +66,7 @@ def test_an_archive_needs_no_option(
     writes: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert callable(writes)
-    rows = turned(1, RATE)
+    rows = turned(1, RATE, sides=7)
     path = packed(tmp_path, writes(rows))
     assert main(["import", str(path), "-o", str(tmp_path / "s")]) == 0
     session = Session.open(tmp_path / "s")

@@ -16,7 +16,7 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.read_options import ReadOptions, seconds_in
 from fieldcal.importing.words.tick_units import SECONDS, parse_tick, tick_seconds
 
-ROWS = turned(7, 100.0, 2.0)
+ROWS = turned(7, 100.0, 2.0, sides=7)
 DEGREES = np.array([*[1.0] * 3, *[180 / np.pi] * 3])
 
 

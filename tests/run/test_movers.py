@@ -41,7 +41,7 @@ def wait(mover: CommandMover) -> None:
 def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
     out = tmp_path / "said"
     call = script(tmp_path, f"import sys; open({str(out)!r}, 'w').write(str(sys.argv))")
-    with CommandMover(call, 20.0) as mover:
+    with CommandMover(call, HANGS) as mover:
         assert not mover.busy()
         mover.turn(FIVE_POSITIONS[3], 3)
         wait(mover)
@@ -52,7 +52,11 @@ def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("body", "timeout", "says"),
     [
-        ("import sys; sys.exit('axis 2 is stuck')", 20.0, "exit code 1: axis 2 is stu"),
+        (
+            "import sys; sys.exit('axis 2 is stuck')",
+            HANGS,
+            "exit code 1: axis 2 is stu",
+        ),
         ("import time; time.sleep(60)", 0.3, "was not done after 0.3 s"),
     ],
 )
@@ -67,7 +71,7 @@ def test_a_command_that_fails_is_said(
 
 def test_what_a_command_says_need_not_be_utf_8(tmp_path: Path) -> None:
     body = r"import sys; sys.stderr.buffer.write(b'T\374r offen\n'); sys.exit(3)"
-    with CommandMover(script(tmp_path, body), 20.0) as mover:
+    with CommandMover(script(tmp_path, body), HANGS) as mover:
         mover.turn(Position.deg(1.0, 0.0), 0)
         with pytest.raises(MoverFailed, match="exit code 3: T.r offen"):
             wait(mover)
@@ -81,7 +85,7 @@ def test_what_a_command_says_need_not_be_utf_8(tmp_path: Path) -> None:
 def test_numbers_may_be_formatted(form: str, argument: str, tmp_path: Path) -> None:
     said = tmp_path / "said"
     body = f"import sys; open({str(said)!r}, 'w').write(sys.argv[-1])"
-    with CommandMover([*script(tmp_path, body), form], 20.0) as mover:
+    with CommandMover([*script(tmp_path, body), form], HANGS) as mover:
         mover.turn(Position.deg(22.5, -5.0), 2)
         wait(mover)
     assert said.read_text() == argument

@@ -16,7 +16,7 @@ import tomlkit
 from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
-from processes import script, steady
+from processes import HANGS, script, steady
 
 from fieldcal import procedures
 from fieldcal.cli import main
@@ -219,7 +219,7 @@ if sys.argv[1] == {fails!r}:
 
 def run(folder: Path, device: VirtualMover, fails: str, junit: Path, *more: str) -> int:
     call = script(folder, CALLER.format(control=device.control, fails=fails))
-    mover = {"kind": "command", "command": call, "timeout_s": 30.0}
+    mover = {"kind": "command", "command": call, "timeout_s": HANGS}
     tables = {
         "device": {"squareness": 1e-5},
         "site": {

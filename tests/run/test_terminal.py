@@ -7,6 +7,7 @@ from threading import Event
 
 import numpy as np
 import pytest
+from processes import HANGS
 from rich.console import Console
 from terminal_screens import HOLD, MISPLACED, SCREENS, screen, sized, view
 
@@ -128,7 +129,7 @@ def test_it_is_drawn_until_it_is_stopped() -> None:
 
     redrawing = Redrawing(lambda: drawn.append(len(drawn)), wait)
     redrawing.start()
-    assert enough.wait(60.0)
+    assert enough.wait(HANGS)
     redrawing.stop()
     redrawing.stop()
     assert drawn == [0, 1, 2] and set(waits) == {1.0}

@@ -17,7 +17,7 @@ from fieldcal.core.samples import Block
 
 def solved(tmp_path: Path, sides: int, full_scale: float) -> tuple[int, Any]:
     """Exit code and result of a device laid on some sides, az having a full scale."""
-    rows = turned(4, 50.0, hold=6.0)
+    rows = turned(4, 50.0, hold=6.0, sides=7)
     rows[:, 3] = np.clip(rows[:, 3], -full_scale, full_scale)
     held = [{"start_s": 7.5 * i + 0.5, "end_s": 7.5 * i + 5.5} for i in range(sides)]
     block = Block.of(rows[:, 0], rows[:, 1:4], rows[:, 4:])

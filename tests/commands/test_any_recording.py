@@ -467,13 +467,14 @@ def test_a_sensor_that_says_nothing_does_not_cost_the_other(
 def test_gyroscopes_along_other_axes_are_named_and_mended(
     axes: str, columns: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = turned(8, 50.0, 4.0)
+    rows = turned(8, 50.0, 4.0, sides=7)
     own = {"+y-x+z": rows[:, [5, 4, 6]] * [1, -1, 1], "-x-y-z": -rows[:, 4:]}[axes]
     np.savetxt(tmp_path / "log.csv", np.c_[rows[:, :4], own], delimiter=",",
                comments="", header="t,ax,ay,az,gx,gy,gz")  # fmt: skip
     said = ["--acc-unit", "m/s^2", "--gyr-unit", "rad/s", "--latitude", "45"]
     log, folder = str(tmp_path / "log.csv"), tmp_path / "s"
-    assert main(["import", log, "-o", str(folder), *said]) == 0
+    as_named = ["--columns", "t,ax,ay,az,gx,gy,gz"]  # as they are, or it is asked
+    assert main(["import", log, "-o", str(folder), *said, *as_named]) == 0
     capsys.readouterr()
     _, found = diagnosed(folder, capsys)
     (named,) = [e for e in found["effects"] if e["id"] == "mounting"]
@@ -519,7 +520,7 @@ def test_a_mirrored_device_is_mirrored_and_its_gyroscopes_do_not_turn_back(
 def test_a_hand_that_trembles_now_and_then_is_no_noisy_sensor(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows, rng = turned(8, 50.0, 6.0), np.random.default_rng(4)
+    rows, rng = turned(8, 50.0, 6.0, sides=7), np.random.default_rng(4)
     angle = np.zeros(len(rows))
     for i, kick in enumerate(rng.normal(0, 1.5e-3, len(rows) - 1), 1):
         angle[i] = 0.9 * angle[i - 1] + kick

@@ -56,7 +56,7 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
         (lines(np.arange(float(len(T))), A, W, head=f"t,{SIX}"),
          "or --time-unit s if a row is taken each second"),
         (lines(1e12 * np.arange(len(T)), A, W, head=f"t,{SIX}"),
-         "log.csv: column t: its numbers, 0 to 1.149e+15, make 1e-12 Hz in s"),
+         "log.csv: column t: its numbers, 0 to 8.69e+14, make 1e-12 Hz in s"),
         (lines(1e-13 * np.arange(len(T)), A, W, head=f"t,{SIX}"),
          "or skip this one with _ and give --rate"),
         (lines(1e12 * np.arange(len(T)), A, W, head=f"t (s),{SIX}"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from laid_about import G, write
+from laid_about import G, turned, write
 from test_terminal_forms import ROWS, numbers
 from written_logs import DEG, A, T, W, assert_same, imported
 
@@ -133,9 +133,9 @@ def test_values_may_stay_over_now_more_now_fewer_rows(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A program takes what a slow gyroscope has sent last."""
-    stays = np.random.default_rng(5).integers(4, 9, len(T))
-    rows = np.column_stack([T, A, W])
-    rows[:, 4:] = np.repeat(rows[:, 4:], stays, axis=0)[: len(T)]
+    rows = turned(5, 50.0, 2.0, sides=7)
+    stays = np.random.default_rng(5).integers(4, 9, len(rows))
+    rows[:, 4:] = np.repeat(rows[:, 4:], stays, axis=0)[: len(rows)]
     imported(write(tmp_path, rows, heading="t,ax,ay,az,gx,gy,gz"))
     said = capsys.readouterr().err
     assert "its gyroscopes stay over about 6 rows each" in said

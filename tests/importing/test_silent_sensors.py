@@ -13,7 +13,7 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.session.stream_facts import StreamFacts
 from fieldcal.session.folder import Session
 
-ROWS = turned(61, 50.0, 3.0)
+ROWS = turned(61, 50.0, 3.0, sides=7)
 NAMES = "t,ax,ay,az,gx,gy,gz"
 TURNING = 1 + int(50 * (3 * 4.5 + 3.6))
 """A row amid the fourth turn."""

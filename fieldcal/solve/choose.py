@@ -28,8 +28,9 @@ from fieldcal.solve.latitude import VerticalEarthRate
 from fieldcal.solve.lot_contribution import combine_with_lot
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.options import SolveOptions
+from fieldcal.solve.other_earth_rates import OtherEarthRates
 from fieldcal.solve.result import build_calibration
-from fieldcal.solve.session_fit import EarthRateModel, SessionFit
+from fieldcal.solve.session_fit import SessionFit
 
 NO_EARTH = (
     "the gyroscopes do not show the Earth's rate, as those of a simulator without it:"
@@ -137,23 +138,23 @@ def _fit_over_earth_rates(
     The most likely one is the result. Its covariance includes the differences from the
     others, weighted by their probabilities. Simulators may have no Earth's rate.
     """
-
-    def fitted(earth: EarthRateModel) -> tuple[ParameterEstimate, list[str]]:
-        return SessionFit(observations, options, method, recorded, earth).best_fit()
-
-    estimate, notes = fitted("stated")
+    session = SessionFit(observations, options, method, recorded)
+    estimate, notes = session.best_fit()
     shown = VerticalEarthRate.of(
         estimate.parameter_set, estimate.sets, observations.latitude
     )
     if shown is None or not shown.other_favoured:
         return estimate, notes
-    other, (none, others) = fitted("another")[0], fitted("none")
-    ahead = none.score - estimate.score + np.log(priors.WRONG_LATITUDE_CHANCE)
+    rates = OtherEarthRates.of(estimate, session.nominal, session.base_rate)
+    ahead = rates.none.score - rates.stated.score + np.log(priors.WRONG_LATITUDE_CHANCE)
     score = np.array([0.0, shown.gain, ahead])
     weights = np.exp(score - score.max())
     as_said, elsewhere, absent = (weights / weights.sum()).tolist()
     if ahead > max(0.0, shown.gain):
-        mixed = none.with_model_uncertainty(none, estimate, as_said)
-        return mixed.with_model_uncertainty(none, other, elsewhere), [NO_EARTH, *others]
-    mixed = estimate.with_model_uncertainty(estimate, other, elsewhere)
-    return mixed.with_model_uncertainty(estimate, none, absent), notes
+        bare = SessionFit(observations, options, method, recorded, earth=False)
+        none, others = bare.best_fit()
+        mixed = none.with_model_uncertainty(rates.none, rates.stated, as_said)
+        mixed = mixed.with_model_uncertainty(rates.none, rates.another, elsewhere)
+        return mixed, [NO_EARTH, *others]
+    mixed = estimate.with_model_uncertainty(rates.stated, rates.another, elsewhere)
+    return mixed.with_model_uncertainty(rates.stated, rates.none, absent), notes

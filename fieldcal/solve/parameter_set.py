@@ -10,15 +10,17 @@ by the fixture each time the same detent is set, the other is new in each positi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import TILTS, Tilt, group_of
 from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Cause, Group
@@ -147,6 +149,17 @@ class ParameterSet(Dictionary):
         """All groups; those that every set has come first."""
         return [*self.always, *(g for _, g in self.members)]
 
+    def with_earth_sigma(self, size: Array) -> Self:
+        """The set with another uncertainty (3,) of the Earth's rate, rad/s.
+
+        None about axes where it is 0. Of a set that has columns of that rate.
+        """
+        out = copy(self)
+        cause = self._earth_rate_cause(self.earth + np.arange(3), size)
+        kept = [c for c in self.causes if c.name != cause.name]
+        out.causes = [*kept, cause] if size.any() else kept
+        return out
+
     # -- contents
 
     def _calibration(self) -> Iterator[Group]:
@@ -178,7 +191,7 @@ class ParameterSet(Dictionary):
                 "gyro_cross_coupling", free=priors.GYRO_COUPLING_SIZE
             )
         if any(w.earth) and oriented:
-            yield self._earth_rate_cause(np.array(w.earth))
+            yield self._earth_rate_cause(self.add_earth(), np.array(w.earth))
         if w.angles_deg:
             yield from self._angle_causes(float(np.deg2rad(w.angles_deg)))
         if (lost := np.flatnonzero(self.cut)).size:
@@ -218,9 +231,9 @@ class ParameterSet(Dictionary):
         size = np.full(len(group.params), known)
         return _given_cause(replace(group, typical=size, fixed_size=1.0))
 
-    def _earth_rate_cause(self, size: Array) -> Cause:
-        """Uncertainty of the Earth's rate."""
-        at, kept = self.add_earth(), np.flatnonzero(size)
+    def _earth_rate_cause(self, at: Index, size: Array) -> Cause:
+        """Uncertainty of the Earth's rate, in columns (3,)."""
+        kept = np.flatnonzero(size)
         return _given_cause(
             Group("earth", "", at[kept], size[kept], fixed_size=1.0, in_state=True)
         )

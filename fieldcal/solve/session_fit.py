@@ -7,13 +7,11 @@ about equally well, the covariance includes the difference.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
 from fieldcal.calibration import Method
 from fieldcal.calibration.names import TILTS, Tilt, group_of
-from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.sentences import join_words
 from fieldcal.model import thresholds
 from fieldcal.model.causes.planned import parameters
@@ -30,9 +28,6 @@ from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.parameter_set import ParameterSetOptions
 from fieldcal.solve.rank import ladder_remedy
 
-EarthRateModel = Literal["stated", "another", "none"]
-"""Earth's rate in the gyroscopes: of the stated latitude, of another one, or none."""
-
 
 class SessionFit:
     """Fits of several parameter sets to the rows of one session.
@@ -43,7 +38,12 @@ class SessionFit:
     options : options
     method : chosen method
     recorded : rows of the recording; None if there are only means
-    earth : Earth's rate in the gyroscopes
+    earth : whether the gyroscopes measure the Earth's rate
+
+    Attributes
+    ----------
+    base_rate : (3,) rad/s, the Earth's rate in base axes as far as it is known
+    nominal : state to start from
 
     """
 
@@ -53,22 +53,22 @@ class SessionFit:
         options: SolveOptions,
         method: Method,
         recorded: RecordedRows | None,
-        earth: EarthRateModel = "stated",
+        earth: bool = True,
     ) -> None:
         self.observations, self.options, self.method = observations, options, method
         navigation = observations.grade == "navigation"
-        base, self.earth_sigma = known_earth_rate(
+        self.base_rate, self.earth_sigma = known_earth_rate(
             observations.latitude, navigation, options.heading, observations.base_motion
         )
-        if earth == "another":
-            self.earth_sigma = (self.earth_sigma[0], EARTH_RATE, self.earth_sigma[2])
-        elif earth == "none":
-            base, self.earth_sigma = np.zeros(3), (0.0, 0.0, 0.0)
+        if not earth:
+            self.base_rate, self.earth_sigma = np.zeros(3), (0.0, 0.0, 0.0)
         recorded_rows = recorded or rows_of_observations(observations)
         rows = recorded_rows.rows
         if method == "scalar":
             rows = without_angles(rows, observations.nominal)
-        self.recorded = replace(recorded_rows, rows=with_base_rate(rows, base))
+        self.recorded = replace(
+            recorded_rows, rows=with_base_rate(rows, self.base_rate)
+        )
         self.turn_integrator = (
             self.recorded.turn_integrator() if observations.has_gyr else None
         )

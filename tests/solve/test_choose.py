@@ -52,21 +52,20 @@ def test_the_tilt_that_is_fitted(
     assert one.best_fit() == (asked, [])
 
 
-def test_rates_of_the_earth_of_the_three_models() -> None:
+def test_the_rate_of_the_earth_is_that_of_the_place_or_none() -> None:
     seen = observed(latitude=0.7)
     options = SolveOptions(heading_deg=1.0)
     earth = 7.292115e-5
-    said, another, none = (
-        SessionFit(seen, options, "joint", None, cast(Any, model))
-        for model in ("stated", "another", "none")
+    said, none = (
+        SessionFit(seen, options, "joint", None, there) for there in (True, False)
     )
     unsure = earth * np.cos(0.7) * np.deg2rad(1.0)
     assert said.earth_sigma == pytest.approx((unsure, 0.0, 0.0))
-    assert another.earth_sigma == pytest.approx((unsure, earth, 0.0))
     assert none.earth_sigma == (0.0, 0.0, 0.0)
     home = earth * np.array([0.0, -np.sin(0.7), np.cos(0.7)])
-    for one, base in ((said, home), (another, home), (none, np.zeros(3))):
+    for one, base in ((said, home), (none, np.zeros(3))):
         np.testing.assert_allclose(one.recorded.rows.x.base_rate, base)
+        np.testing.assert_allclose(one.base_rate, base)
 
 
 def fitted(score: float, **known: Any) -> Any:
@@ -180,16 +179,25 @@ def over_rates(
 ) -> tuple[Any, list[str], list[str]]:
     """Fits with the Earth's rate as stated, another (by `gain`) and none."""
     asked: list[str] = []
-    fits = {"stated": fitted(0.0, bias=1.0), "another": fitted(0.0, bias=3.0),
-            "none": fitted(none, bias=7.0)}  # fmt: skip
+    fits = {"stated": fitted(40.0, bias=1.0), "none": fitted(none, bias=7.0)}
+    rates = SimpleNamespace(
+        stated=fitted(0.0, bias=1.0), another=fitted(0.0, bias=3.0), none=fits["none"]
+    )
 
     class Session:
-        def __init__(self, *told: Any) -> None:
-            self.earth = told[-1]
+        nominal, base_rate = "nominal", "base rate"
+
+        def __init__(self, *told: Any, earth: bool = True) -> None:
+            self.earth = "stated" if earth else "none"
 
         def best_fit(self) -> Any:
             asked.append(self.earth)
             return fits[self.earth], [f"a note of {self.earth}"]
+
+    def of(*told: Any) -> Any:
+        assert told == (fits["stated"], "nominal", "base rate")
+        asked.append("others")
+        return rates
 
     shown = None
     if gain is not None:
@@ -198,6 +206,7 @@ def over_rates(
     measured = SimpleNamespace(of=lambda *told: shown)
     monkeypatch.setattr(choose, "SessionFit", Session)
     monkeypatch.setattr(choose, "VerticalEarthRate", measured)
+    monkeypatch.setattr(choose, "OtherEarthRates", SimpleNamespace(of=of))
     found, notes = choose._fit_over_earth_rates(
         observed(), SolveOptions(), "joint", None
     )
@@ -219,7 +228,7 @@ def test_other_rates_of_the_earth_are_in_the_covariance(
 ) -> None:
     """Odds of 1 for the stated one, e^gain for another, e^none / 1000 for none."""
     found, notes, asked = over_rates(monkeypatch, gain, none)
-    assert asked == ["stated", "another", "none"]
+    assert asked == ["stated", "others"]
     odds = np.array([1.0, np.exp(gain), 1e-3 * np.exp(none)])
     weight = odds / odds.sum()
     assert found.values[0] == 1.0 and notes == ["a note of stated"]
@@ -230,7 +239,8 @@ def test_other_rates_of_the_earth_are_in_the_covariance(
 def test_no_rate_of_the_earth_is_taken_where_it_is_the_likeliest(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    found, notes, _ = over_rates(monkeypatch, 1.0, 9.0)
+    found, notes, asked = over_rates(monkeypatch, 1.0, 9.0)
+    assert asked == ["stated", "others", "none"]
     odds = np.array([1.0, np.exp(1.0), 1e-3 * np.exp(9.0)])
     weight = odds / odds.sum()
     assert found.values[0] == 7.0

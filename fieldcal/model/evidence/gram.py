@@ -74,6 +74,16 @@ class Gram:
         kept = {name: getattr(self, name)[windows] for name in parts}
         return replace(self, info=info[windows], **kept)
 
+    def with_known(self, columns: Index, values: Array) -> Gram:
+        """The rows less what columns (c,) of the dictionary of known values add."""
+        at = self.index[columns]
+        taken = self.within.part(np.arange(len(self.rhs)), at) @ values
+        square = self.square - float(values @ (2 * self.rhs[at] - taken[at]))
+        return replace(
+            self, rhs=self.rhs - taken, square=square,
+            residual=self.residual - self.means[:, :, at] @ values,
+        )  # fmt: skip
+
     def with_instability(self, tau: Array) -> WeightedGram:
         """Weight the means with instabilities by kind, (7,)."""
         if self.free_rotations.any():

@@ -56,6 +56,18 @@ def test_information_is_that_of_the_rows(seed: int, free: tuple[int, ...]) -> No
 
 @SEEDS
 @FREE
+def test_known_columns_are_taken_off_the_rows(seed: int, free: tuple[int, ...]) -> None:
+    one = case(seed, free)
+    known, values = np.array([6, 2]), np.array([0.8, -1.7])
+    left = replace(one.dense, y=one.dense.y - one.dense.design[:, known] @ values)
+    rows = one.gram.with_known(known, values).with_instability(TAU)
+    assert_agree(rows.rhs(SET), left.information()[1][SET])
+    square = left.y @ np.linalg.solve(left.cov, left.y)
+    assert rows.square == pytest.approx(square, rel=1e-9)
+
+
+@SEEDS
+@FREE
 def test_squares_and_determinant_are_those_of_the_rows(
     seed: int, free: tuple[int, ...]
 ) -> None:

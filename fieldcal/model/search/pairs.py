@@ -17,7 +17,12 @@ What a pair explains grows with its sizes, and no determinant is below one, so
 
     gain <= q_j^T E q_j / 2 + b'^T (M' + 1 / u^2)^-1 b' / 2    at the largest u, v  (3)
 
-and the sizes of pairs whose bound is below the required gain are not calculated.
+and where that is not below the required gain, with the gain of the wider group j beside
+i at its largest size, whose determinant is the smaller factor of that of both,
+
+    gain <= q_i^T E q_i / 2 + gain_j(v)    at the largest u                         (4)
+
+The sizes of pairs with a bound below the required gain are not calculated.
 
 Source: the matrix determinant lemma and the Woodbury identity.
 """
@@ -85,17 +90,20 @@ def pair_gains(
     }
     number = np.array([np.sum(wide[:i] == w) for i, w in enumerate(wide)])
     for v, w in np.unique(wide[every], axis=0).tolist():
-        pair_numbers = np.flatnonzero((wide[every] == (v, w)).all(axis=1))
-        i, j = every[pair_numbers].T
+        numbers = np.flatnonzero((wide[every] == (v, w)).all(axis=1))
+        i, j = every[numbers].T
         one, two = alone[v].at_numbers(number[i]), alone[w].at_numbers(number[j])
         shared = inner[one.at[:, :, None], two.at[:, None, :]]
-        kept = _gain_bound(one, two, shared) >= enough[pair_numbers]
-        if kept.any():
-            both = (one.at_numbers(kept), two.at_numbers(kept), shared[kept])
-            start = np.asarray(sizes)[i[kept]]
-            yield from _gains_of_equal_widths(
-                *both, start, every[pair_numbers[kept]].tolist()
-            )
+        for bound in (_gain_bound, _closer_bound):
+            kept = bound(one, two, shared) >= enough[numbers]
+            numbers = numbers[kept]
+            if not len(numbers):
+                break
+            one, two, shared = one.at_numbers(kept), two.at_numbers(kept), shared[kept]
+        else:
+            start = np.asarray(sizes)[every[numbers, 0]]
+            pairs = every[numbers].tolist()
+            yield from _gains_of_equal_widths(one, two, shared, start, pairs)
 
 
 def _gain_bound(one: _SeparateGroups, two: _SeparateGroups, shared: Array) -> Array:
@@ -109,6 +117,17 @@ def _gain_bound(one: _SeparateGroups, two: _SeparateGroups, shared: Array) -> Ar
     own = (two.along**2 / (two.strength + SIZES[-1] ** -2)).sum(axis=1)
     square = own + (rhs * beside).sum(axis=1)
     most: Array = 0.5 * square + 2 * LOG_DENSITY.max()
+    return most
+
+
+def _closer_bound(one: _SeparateGroups, two: _SeparateGroups, shared: Array) -> Array:
+    """Closer upper bound of each pair's gain, (n,), by (4)."""
+    if one.at.shape[1] > two.at.shape[1]:
+        one, two, shared = two, one, np.swapaxes(shared, 1, 2)
+    largest = np.full(len(shared), len(SIZES) - 1)
+    beside = _GroupsAfterOthers(two, one, np.swapaxes(shared, 1, 2)).profile(largest)
+    own = (one.along**2 / (one.strength + SIZES[-1] ** -2)).sum(axis=1)
+    most: Array = 0.5 * own + beside.max(axis=1) + LOG_DENSITY.max()
     return most
 
 
@@ -264,10 +283,11 @@ def offered_pairs(
     count = len(narrow)
     widened = [a is not b for a, b in zip(narrow, offers[count:], strict=True)]
     pairs, log_prior = [], {}
+    before = sets.set_log_prior(current.members)
     for i, j in combinations(range(count), 2):
         wide = i + widened[i] * count, j + widened[j] * count
         both = [*current.members, narrow[i].member, narrow[j].member]
-        chance = sets.set_log_prior(both) - sets.set_log_prior(current.members)
+        chance = sets.set_log_prior(both) - before
         for pair in {(i, j), wide}:
             pairs.append(pair)
             log_prior[pair] = chance

@@ -108,8 +108,12 @@ def way_of_removal(case: Cases) -> str:
 
 def _cases(rows: Iterable[tuple[float, ...]]) -> Cases:
     """Equally likely cases from rows of their values."""
-    every = [tuple(map(float, row)) for row in rows]
-    return np.array([(*row, 1 / len(every)) for row in every], dtype=CASE)
+    every = np.array([*rows], dtype=float)
+    cases = np.zeros(len(every), dtype=CASE)
+    for name, column in zip(CASE.names or (), every.T, strict=False):
+        cases[name] = column
+    cases["share"] = 1 / len(every)
+    return cases
 
 
 def _walks(keeps: BiasSpread) -> list[float]:

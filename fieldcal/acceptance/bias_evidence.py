@@ -63,12 +63,15 @@ def removals_by_likelihood(
     kinds = [followed_cases(keeps, density), *np.split(averaged, len(averaged))]
     shares = [FOLLOWED_SHARE] + [UNSEEN_MEAN_SHARE / len(averaged)] * len(averaged)
     blind = [float(kind["blind"][0]) for kind in kinds]
-    rivals = [kept_cases(keeps, density, one) for one in blind]
+    used = [tuple(bool(step.since_turn >= b) for step in steps) for b in blind]
+    unlike = dict(zip(used, blind, strict=True))  # which leave out other means
+    rivals = [kept_cases(keeps, density, one) for one in unlike.values()]
     fits = _Fit.split(steps, density, keeps, [*kinds, *rivals])
-    for i, (kind, share) in enumerate(zip(kinds, shares, strict=True)):
-        alone = earth_rate_alone(steps, density, blind[i])
-        ratio = _log_ratio(fits[i], fits[len(kinds) + i], alone)
-        how = way_of_removal(kind[int(np.argmax(fits[i].logs))])
+    kept = dict(zip(unlike, fits[len(kinds) :], strict=True))
+    alone = {key: earth_rate_alone(steps, density, b) for key, b in unlike.items()}
+    for kind, share, key, fit in zip(kinds, shares, used, fits, strict=False):
+        ratio = _log_ratio(fit, kept[key], alone[key])
+        how = way_of_removal(kind[int(np.argmax(fit.logs))])
         yield Removal(float(ratio) + np.log(share), how)
 
 

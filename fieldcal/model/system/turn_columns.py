@@ -156,8 +156,9 @@ class ColumnsOfTurns:
 
     def _add_at_ends(self, at_ends: EndColumns) -> None:
         """Add a basis that changes the inputs in positions."""
-        for one in self.found:
-            one.add_outputs(*at_ends.columns_for(one.turn, self.state.scale))
+        columns = at_ends.columns_of(self.turns, self.state.scale)
+        for one, parts in zip(self.found, columns, strict=True):
+            one.add_outputs(*parts)
 
     def _add_course(self, first: int, course: Course, loose: bool) -> None:
         """Add a course to all turns; it rotates the force at ends that are `loose`."""

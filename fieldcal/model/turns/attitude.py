@@ -143,7 +143,7 @@ def closures(f: Array, held: Array, end: Array) -> tuple[Array, Mask]:
     ----------
     f : (n, 2, 3) forces in both positions, device axes
     held : (n, 2, 3, 3) direction cosines from base to device; nan where unknown
-    end : (3, 3) attitude R at the end of the turn
+    end : (3, 3), or (n, 3, 3), attitude R at the end of the turn
 
     Returns
     -------
@@ -151,14 +151,16 @@ def closures(f: Array, held: Array, end: Array) -> tuple[Array, Mask]:
     p, from the directions of both forces
 
     """
-    rotation = end.T @ held[:, 1] @ np.swapaxes(held[:, 0], 1, 2)  # I + [phi]x
+    rotation = (
+        np.swapaxes(end, -1, -2) @ held[:, 1] @ np.swapaxes(held[:, 0], 1, 2)
+    )  # I + [phi]x
     whole = (np.trace(rotation, axis1=1, axis2=2) - 1) / 2 > np.cos(
         thresholds.MAX_MISCLOSURE_RAD
     )
     if whole.all():
         return antisymmetric_vector(rotation), whole
     up = f[:, 0] / np.linalg.norm(f[:, 0], axis=1, keepdims=True)
-    force = f[:, 1] @ end
+    force = (f[:, 1, None] @ end)[:, 0]
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     return np.where(
         whole[:, None], antisymmetric_vector(rotation), cross(up, force)

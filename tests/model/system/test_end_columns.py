@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,6 +50,17 @@ def turn(x: Experience) -> Turn:
     )  # fmt: skip
 
 
+def columns_of(basis: General, first: int, one: Turn, x: Experience) -> Any:
+    """Columns of a turn that is calculated together with another, longer one."""
+    more = np.repeat(one.attitude, 2, axis=0)
+    other = replace(
+        one, positions=PAIR[::-1], attitude=more, done=np.repeat(one.done, 2)
+    )
+    at_ends = EndColumns.of(first, basis, positions_about(x, STATE))
+    _, found = at_ends.columns_of([other, one], SCALE)
+    return found
+
+
 def seen(one: Turn, state: State, x: Experience) -> tuple[Array, Array]:
     """Outputs at the edges (m + 1, 6) and closure of a state, one edge by the other."""
     there = state.experienced(x)
@@ -67,9 +79,7 @@ def test_small_rotations_are_met_at_both_ends_and_nowhere_else(x: Experience) ->
     sides = columns.small_rotation_sides
     basis = General("aside", columns.small_rotation, sides=sides, per_position=True)
     one = turn(x)
-    at, outputs, moved = EndColumns.of(5, basis, positions_about(x, STATE)).columns_for(
-        one, SCALE
-    )
+    at, outputs, moved = columns_of(basis, 5, one, x)
     np.testing.assert_array_equal(at, 5 + np.array([4, 5, 6, 7]))
     for k, (p, i) in enumerate([(2, 0), (2, 1), (3, 0), (3, 1)]):
         both = []
@@ -85,9 +95,7 @@ def test_small_rotations_are_met_at_both_ends_and_nowhere_else(x: Experience) ->
 def test_an_effect_is_met_at_both_ends_at_once() -> None:
     effect = catalogue()["angle_offset"]
     basis, one = effect_basis(effect, {}, 0), turn(ALL)
-    at, outputs, moved = EndColumns.of(
-        40, basis, positions_about(ALL, STATE)
-    ).columns_for(one, SCALE)
+    at, outputs, moved = columns_of(basis, 40, one, ALL)
     np.testing.assert_array_equal(at, [40, 41])
     for k in range(2):
         both = []

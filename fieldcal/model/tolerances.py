@@ -49,6 +49,10 @@ FORGOTTEN_EXPONENT = 40.0
 """Exponent from which a filter has forgotten what was: e^-40 is 4e-18, and a double has
 no such digit."""
 
+SAME_VARIANCE = 1e-4
+"""Relative difference of variances that is none: the logarithm of an evidence of a
+hundred means changes by a thousandth, a twentieth of what a search counts as a rise."""
+
 # -- steps of numerical derivatives
 
 DERIVATIVE_STEP = 1e-3

@@ -89,16 +89,20 @@ class Gram:
         if self.free_rotations.any():
             root, log_det = self.whitening(tau)
             return WeightedGram(self, np.zeros(0), root, float(log_det))
-        variance = self._shared_variance(tau)
-        weight = self.info / (1 + self.info * variance)
-        log_det = np.log1p(self.info * variance).sum()
-        return WeightedGram(self, weight, np.zeros(0), float(log_det))
+        variance = self.relative_variance(tau)
+        log_det = np.log(variance).sum()
+        return WeightedGram(self, self.info / variance, np.zeros(0), float(log_det))
 
-    def _shared_variance(self, tau: Array) -> Array:
-        """Variance of the means in addition to white noise, by channel, (..., p, 6).
+    def relative_variance(self, tau: Array) -> Array:
+        """Variance of the means over that by white noise, by channel, (..., p, 6).
 
         `tau` (..., 7) are the instabilities.
         """
+        out: Array = 1 + self.info * self._shared_variance(tau)
+        return out
+
+    def _shared_variance(self, tau: Array) -> Array:
+        """Variance of the means in addition to white noise, by channel, (..., p, 6)."""
         square = tau**2
         closures = np.einsum("pij,...j->...pi", self.closure_errors**2, square[..., :6])
         out: Array = self.shared**2 + square[..., self.kind] + closures
@@ -114,9 +118,9 @@ class Gram:
             root, log_det = self.whitening(tau)
             whole: Array = (root @ table)[..., known, :]
             return whole, log_det
-        excess = self.info * self._shared_variance(tau)
-        weight = np.sqrt(self.info / (1 + excess))[..., known]
-        return weight[..., None] * table[known], np.log1p(excess).sum(axis=(-2, -1))
+        variance = self.relative_variance(tau)
+        weight = np.sqrt(self.info / variance)[..., known]
+        return weight[..., None] * table[known], np.log(variance).sum(axis=(-2, -1))
 
     def whitening(self, tau: Array) -> tuple[Array, Array]:
         """Whitening W of the means at instabilities, (..., p, 6, 6), and ln |R|.
@@ -125,7 +129,7 @@ class Gram:
         """
         # root of (1) as a product, by the singular values of what rotations add: means
         # of repeated or smoothed samples are known 1e10 times better than rotations
-        alone = 1 + self.info * self._shared_variance(tau)
+        alone = self.relative_variance(tau)
         weight = np.sqrt(self.info / alone)
         along, size, _ = np.linalg.svd(
             weight[..., None] * self.free_rotations, full_matrices=False

@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from fieldcal.core.samples import Array
-from fieldcal.model import priors, resolutions
+from fieldcal.model import priors, resolutions, tolerances
 from fieldcal.model.causes.cause import CLOSURE, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.eliminated import Eliminated
@@ -48,6 +50,26 @@ def tried_instabilities(
             for up in resolutions.CLOSURE_STEPS_UP
         ]
     return list(dict.fromkeys(tried))
+
+
+def unlike_instabilities(
+    sets: Sets, tried: Sequence[InstabilityIndices]
+) -> list[InstabilityIndices]:
+    """Some instabilities without those that the means cannot tell from another.
+
+    The first is that of a set, and stays. Of those at which all means have nearly the
+    same variance, the likeliest before the rows are seen: at each, a cause would add
+    the same evidence.
+    """
+    kept: dict[InstabilityIndices, Array] = {}
+    for one in sorted(tried[1:], key=lambda i: -sets.instability_log_prior(i)):
+        variance = sets.gram.relative_variance(sets.instability_sigma(one))
+        if not any(
+            np.allclose(variance, other, rtol=tolerances.SAME_VARIANCE, atol=0.0)
+            for other in kept.values()
+        ):
+            kept[one] = variance
+    return [*tried[:1], *(one for one in tried[1:] if one in kept)]
 
 
 def lowered_instability(
@@ -102,9 +124,8 @@ def at_tried_instabilities(
 
     wide = _typical_sizes(current)
     other = None if other_sizes is None else other_sizes.instability
-    for instability in tried_instabilities(
-        sets.typical_instability, own.instability, other
-    ):
+    tried = tried_instabilities(sets.typical_instability, own.instability, other)
+    for instability in unlike_instabilities(sets, tried):
         yield at(instability, own.calibration)
         if wide != own.calibration and instability != own.instability:
             yield at(instability, wide)

@@ -10,9 +10,11 @@ import pytest
 from small_sessions import Session, ladder
 
 from fieldcal.model import priors, thresholds
+from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
 from fieldcal.model.search.selection import Search
+from fieldcal.model.search.set_at_instability import unlike_instabilities
 from fieldcal.model.search.variations import visit_variations
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "cross_coupling", "settling:acc",
@@ -262,3 +264,27 @@ def test_what_is_known_from_elsewhere_stays_so_large_beside_every_offer() -> Non
         np.testing.assert_array_equal(
             table.state.prior_sigma[at], nothing.state.prior_sigma[at]
         )
+
+
+def test_instabilities_that_the_means_cannot_tell_apart_are_one() -> None:
+    """Too small ones, of which axes alike are the likeliest; a set's own one stays."""
+    sets = drawn().sets
+    own, large = (17, 16, 18, 15, 15, 15, 16), (17, 16, 18, 14, 14, 14, 16)
+    small, less, none = ((n + 1, n, n + 2, *own[3:]) for n in (4, 2, 0))
+    alike = (3, 3, 3, *own[3:])
+    every = [own, large, own[:3] + small[:3] + own[6:], small, less, none, alike]
+    kept = unlike_instabilities(sets, every)
+    assert kept == [*every[:3], alike]
+    group = CAUSES["bias_drift:acc"].variants[0]
+    state = sets.evaluate(()).state
+    gains = [
+        Eliminated.of(sets.gram_at(one), state.columns, state.prior_sigma).gain_by_size(
+            group.columns, group.typical
+        )
+        for one in (small, less, none, alike, own)
+    ]
+    for gain in gains[:3]:
+        np.testing.assert_allclose(gain, gains[3], rtol=1e-5)
+    assert np.abs(gains[4] - gains[3]).max() > 0.1
+    assert len(unlike_instabilities(sets, [none, less, small])) == 2
+    assert unlike_instabilities(sets, [alike]) == [alike]

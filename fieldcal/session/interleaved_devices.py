@@ -24,6 +24,7 @@ from itertools import product
 import numpy as np
 
 from fieldcal.core.once import once_per_block
+from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array, Block, Mask
 from fieldcal.windows.interleaving import (
     MOST_SAMPLES,
@@ -91,6 +92,8 @@ def _found_between(block: Block, ends: tuple[tuple[int, int], ...]) -> OnePlace 
         return None
     rests = [RestOutputs.of(part.six) for part in parts]
     found = {k: [one_place_of_period(rest, k) for rest in rests] for k in PERIODS}
+    if not any(map(_may_differ, found.values())):
+        return None
     period = max(PERIODS, key=lambda k: _surprise(found[k], k))
     pairs = zip(found[period], parts, strict=True)
     known = [(one, part) for one, part in pairs if one is not None and one.steady]
@@ -109,6 +112,17 @@ def _found_between(block: Block, ends: tuple[tuple[int, int], ...]) -> OnePlace 
     return max(places, key=lambda one: float((one.t**2).sum()))
 
 
+def _may_differ(found: Sequence[OnePlace | None]) -> bool:
+    """Whether enough outputs would differ beyond chance if errors were known exactly.
+
+    Where they are not, and of several places, differences count for less.
+    """
+    known = [one.t**2 for one in found if one is not None and one.steady]
+    squares = np.sum(known, axis=0) if known else np.zeros(6)
+    rare = [chi2_tail(float(square), len(known)) for square in squares]
+    return sum(p < CHANCE / (6 * len(PERIODS)) for p in rare) >= LEAST_OUTPUTS
+
+
 def _has_force(part: Block) -> bool:
     """Whether each accelerometer has a value in a window."""
     return bool(np.isfinite(part.acc).any(axis=0).all())
@@ -125,7 +139,7 @@ def _squares(one: OnePlace, period: int) -> Array:
 
     As rare as the largest of all places; the two of a period of 2 tell the same.
     """
-    from scipy.special import ndtri, stdtr
+    from scipy.special import ndtri, stdtr  # a twentieth of a second to import
 
     rare = (period if period > 2 else 1) * stdtr(PIECES - 1, -np.abs(one.t))
     return np.asarray(ndtri(np.clip(rare, np.finfo(float).tiny, 0.5)) ** 2)

@@ -6,8 +6,13 @@ from scipy.spatial.transform import Rotation
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.session.interleaved_devices import find_interleaved_devices
+from fieldcal.session import interleaved_devices
+from fieldcal.session.interleaved_devices import (
+    LEAST_OUTPUTS,
+    find_interleaved_devices,
+)
 from fieldcal.session.mixed_devices import find_mixed_devices, refuse_mixed_devices
+from fieldcal.windows.interleaving import OnePlace
 
 RATE, SECONDS = 100.0, 15.0
 EACH = int(RATE * SECONDS)
@@ -137,3 +142,22 @@ def test_gyroscopes_alone_tell_nothing() -> None:
     six = one_device(9) + places(2) * second(9, 0.5, 3.0)
     six[:, 0] = np.nan
     assert find_interleaved_devices(*recording(six)) is None
+
+
+@pytest.mark.parametrize("k", [2, 7])
+def test_what_differs_beyond_chance_may_differ(k: int) -> None:
+    """From a little above chance on; an unsteady window tells of none."""
+    rng, seen = np.random.default_rng(k), [0, 0]
+    for strength in np.linspace(1.0, 8.0, 60):
+        size = strength * rng.standard_normal((9, 6))
+        found = [OnePlace(one, np.ones(6), True) for one in size]
+        differ = (
+            np.count_nonzero(interleaved_devices._differ(found, k)) >= LEAST_OUTPUTS
+        )
+        may = interleaved_devices._may_differ(
+            [*found, None, OnePlace(size[0], np.full(6, 1e-9), False)]
+        )
+        assert may or not differ
+        seen[may] += 1
+    assert min(seen) > 5
+    assert not interleaved_devices._may_differ([None])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,8 +11,8 @@ from fieldcal.core.samples import Array, Index, Mask
 
 
 @dataclass(frozen=True)
-class LinearRows:
-    """Rows of one channel, whitened.
+class ChannelRows:
+    """Rows of one channel, about any state.
 
     Attributes
     ----------
@@ -20,9 +20,6 @@ class LinearRows:
     rows : (r,) which rows
     window : (r,) number of the window of each row
     weight : (r,) 1/sigma
-    columns : (k,) of the dictionary with influence on the channel
-    design : (r, k) whitened
-    white : (r,) whitened y - h(state)
 
     """
 
@@ -30,6 +27,43 @@ class LinearRows:
     rows: Index
     window: Index
     weight: Array
+
+    def linearised(self, columns: Index, design: Array, white: Array) -> LinearRows:
+        """The rows with their columns (k,), a design (r, k) and (r,) whitened."""
+        own = self.channel, self.rows, self.window, self.weight
+        out = LinearRows(*own, columns, design, white)
+        for cached in ("starts", "windows", "info"):
+            out.__dict__[cached] = getattr(self, cached)
+        return out
+
+    @cached_property
+    def starts(self) -> Index:
+        """First row of each of its windows, (w,)."""
+        return np.flatnonzero(np.diff(self.window, prepend=-1))
+
+    @cached_property
+    def windows(self) -> Index:
+        """Number of each of its windows, (w,)."""
+        return self.window[self.starts]
+
+    @cached_property
+    def info(self) -> Array:
+        """Inverse variance of the mean of each window, (w,)."""
+        return np.add.reduceat(self.weight**2, self.starts)
+
+
+@dataclass(frozen=True)
+class LinearRows(ChannelRows):
+    """Rows of one channel, whitened.
+
+    Attributes
+    ----------
+    columns : (k,) of the dictionary with influence on the channel
+    design : (r, k) whitened
+    white : (r,) whitened y - h(state)
+
+    """
+
     columns: Index
     design: Array
     white: Array
@@ -46,7 +80,7 @@ class LinearRows:
         """The rows with columns more, those of the same rows in `more`."""
         columns = np.concatenate([self.columns, more.columns])
         design = np.hstack([self.design, more.design])
-        out = replace(self, columns=columns, design=design)
+        out = self.linearised(columns, design, self.white)
         if "courses" in self.__dict__:
             beside = self._product(self.design, self.means, more.design, more.means)
             out.__dict__["means"] = np.hstack([self.means, more.means])
@@ -60,22 +94,7 @@ class LinearRows:
         kept = columns[self.columns]
         if kept.all():
             return self
-        return replace(self, columns=self.columns[kept], design=self.design[:, kept])
-
-    @property
-    def starts(self) -> Index:
-        """First row of each of its windows, (w,)."""
-        return np.flatnonzero(np.diff(self.window, prepend=-1))
-
-    @property
-    def windows(self) -> Index:
-        """Number of each of its windows, (w,)."""
-        return self.window[self.starts]
-
-    @property
-    def info(self) -> Array:
-        """Inverse variance of the mean of each window, (w,)."""
-        return np.add.reduceat(self.weight**2, self.starts)
+        return self.linearised(self.columns[kept], self.design[:, kept], self.white)
 
     @cached_property
     def means(self) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from fieldcal.model.causes.cause import Basis
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.rows.averages import Rows
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_rows import LinearRows
+from fieldcal.model.system.linear_rows import ChannelRows, LinearRows
 from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.starting_angles import starting_angles
 
@@ -87,13 +88,22 @@ class WindowSystem(System):
         self, channel: int, columns: Index, table: Array, off: Array
     ) -> LinearRows:
         """Rows of a channel with columns (k,), of a table (n, k) and residuals (n,)."""
-        rows, d = self.rows, self.dictionary
-        use = np.flatnonzero(rows.used[:, channel])
-        left = d.wander.residual_variance_of_rows(rows.length, channel)[use]
-        weight = 1 / np.sqrt(rows.sd[use, channel] ** 2 + left)
-        design, white = table[use] * weight[:, None], off[use] * weight
-        window = np.searchsorted(d.window_positions, rows.x.position[use])
-        return LinearRows(channel, use, window, weight, columns, design, white)
+        of = self._channels[channel]
+        weight = of.weight
+        design, white = table[of.rows] * weight[:, None], off[of.rows] * weight
+        return of.linearised(columns, design, white)
+
+    @cached_property
+    def _channels(self) -> list[ChannelRows]:
+        """Used rows of each channel, with their weights."""
+        rows, d, out = self.rows, self.dictionary, list[ChannelRows]()
+        for c in range(6):
+            use = np.flatnonzero(rows.used[:, c])
+            left = d.wander.residual_variance_of_rows(rows.length, c)[use]
+            weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
+            window = np.searchsorted(d.window_positions, rows.x.position[use])
+            out.append(ChannelRows(c, use, window, weight))
+        return out
 
     def _shows(self, part: LinearRows) -> Mask:
         """Whether each column of a channel shows at its typical size, (k,).

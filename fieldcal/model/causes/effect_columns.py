@@ -53,8 +53,8 @@ def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> Gen
 
 def _sensor_basis(effect: Sensor, shape: Mapping[str, float], origin: int) -> General:
     def of(view: RowView) -> Array:
-        gain = effect.gain(view.state.scale)[:, None]
-        return effect.design(view.with_origin(origin), shape or NO_SHAPE) * gain
+        design = effect.design(view.with_origin(origin), shape or NO_SHAPE)
+        return _with_gain(effect, design, view)
 
     return General(effect.id, of)
 
@@ -108,14 +108,20 @@ def separable_basis(
         parts = []
         for origin, points in groupby(grid, key=itemgetter(1)):
             inputs = view.with_origin(origin)
-            pattern = effect.pattern(inputs)
+            pattern = _with_gain(effect, effect.pattern(inputs), view)
             courses = [effect.course(inputs, shape or NO_SHAPE) for shape, _ in points]
             product = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
             parts.append(product.reshape(len(view.x), 6, -1))
-        gain = effect.gain(view.state.scale)[:, None]
-        return np.concatenate(parts, axis=2) * gain
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
 
     return General(effect.id, of)
+
+
+def _with_gain(effect: Sensor, design: Array, view: RowView) -> Array:
+    """Columns (n, 6, k) by a design of an effect; the design itself if these are it."""
+    if not effect.of_inputs:
+        return design
+    return design * effect.gain(view.state.scale)[:, None]
 
 
 def _changed(

@@ -196,8 +196,16 @@ class Sensor(Effect):
         self, x: Experience, values: Array, shape: Mapping[str, float] = NO_SHAPE
     ) -> Array:
         """Change of the six outputs by parameters (k,), (n, 6), before `gain`."""
-        out: Array = self.design(x, shape) @ values
-        return out
+        return outputs_at(self.design(x, shape), values)
+
+
+def outputs_at(design: Array, values: Array) -> Array:
+    """Outputs (n, 6) of columns (n, 6, k) at values (k,).
+
+    As one product of a matrix: numpy is slow at many of small ones.
+    """
+    out: Array = design.reshape(-1, len(values)) @ values
+    return out.reshape(design.shape[:-1])
 
 
 class Separable(Sensor):

@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.state import State
-from fieldcal.physics.effect import NO_SHAPE, Sensor
+from fieldcal.physics.effect import NO_SHAPE, Sensor, outputs_at
 from fieldcal.physics.experience import Experience
 
 CentralDifference = tuple[Experience, Experience, float]
@@ -141,6 +141,6 @@ def output_derivative(
         if isinstance(term.effect, Sensor):
             shape = term.shape or NO_SHAPE
             ends = (term.effect.design(x, shape) for x in (up, down))
-            at_up, at_down = (design @ term.values for design in ends)
+            at_up, at_down = (outputs_at(design, term.values) for design in ends)
             change = change + (at_up - at_down) * term.effect.gain(state.scale)
     return change / (2 * step)

@@ -35,10 +35,14 @@ def interpolate_vectors(
     and `end` (3, ...) are their values in device axes at both ends, `attitude` (m + 1,
     3, 3) is R, and `done` (m + 1,) the completed part of the turn.
     """
-    part = done.reshape(-1, *[1] * start.ndim)
+    part = done[:, None, None]
     at_start = attitude[-1].T @ end
-    out: Array = (1 - part) * (attitude @ start) + part * (attitude @ at_start)
-    return out
+    # as one product of a matrix: numpy is slow at many of small ones
+    both = np.hstack([start.reshape(3, -1), at_start.reshape(3, -1)])
+    carried = (attitude.reshape(-1, 3) @ both).reshape(len(done), 3, -1)
+    width = both.shape[1] // 2
+    out = (1 - part) * carried[..., :width] + part * carried[..., width:]
+    return out.reshape(len(done), *start.shape)
 
 
 def sampling_error(t: Array, w: Array, each: int, noise: Array) -> float:

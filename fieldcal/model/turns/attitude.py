@@ -41,7 +41,7 @@ def interpolate_vectors(
     both = np.hstack([start.reshape(3, -1), at_start.reshape(3, -1)])
     carried = (attitude.reshape(-1, 3) @ both).reshape(len(done), 3, -1)
     width = both.shape[1] // 2
-    out = (1 - part) * carried[..., :width] + part * carried[..., width:]
+    out: Array = (1 - part) * carried[..., :width] + part * carried[..., width:]
     return out.reshape(len(done), *start.shape)
 
 

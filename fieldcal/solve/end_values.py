@@ -79,36 +79,38 @@ def end_values(d: Dictionary, shown: Sequence[WeightedExplanation]) -> EndValues
     slopes = np.zeros((6, 6, d.width))
     if not changing.any():
         return EndValues(slopes[0], slopes, sudden)
-    for c in range(6):
-        step = tolerances.DERIVATIVE_STEP * np.eye(6)[c]
-        up, down = (_end_outputs(d, changing, s * step) for s in (1.0, -1.0))
-        slopes[:, c] = (up - down) / (2 * tolerances.DERIVATIVE_STEP)  # (1)
-    return EndValues(_end_outputs(d, changing, np.zeros(6)), slopes, sudden)
+    step = tolerances.DERIVATIVE_STEP
+    felt = step * np.concatenate([np.zeros((1, 6)), np.eye(6), -np.eye(6)])
+    still, *moved = _end_outputs(d, changing, felt)
+    slopes = np.stack(moved[:6], axis=1) - np.stack(moved[6:], axis=1)
+    return EndValues(still, slopes / (2 * step), sudden)  # (1)
 
 
-def _end_outputs(d: Dictionary, changing: Array, felt: Array) -> Array:
-    """Outputs by column, (6, k), at the end of the recording for inputs f, w, (6,).
+def _end_outputs(d: Dictionary, changing: Mask, felt: Array) -> Array:
+    """Outputs by column, (m, 6, k), at the end of the recording for inputs (m, 6).
 
-    The last turn is taken as long ago, so that motion of the joints is excluded.
+    The inputs are f and w. The last turn is taken as long ago, so that motion of the
+    joints is excluded.
     """
-    x = select_rows(d.x, [int(np.argmax(d.x.t))])
-    nothing, rest = np.zeros((1, 3)), float(d.x.lasts[int(np.argmax(d.x.t))]) / 2
+    last, m = int(np.argmax(d.x.t)), len(felt)
+    x, rest = select_rows(d.x, [last] * m), float(d.x.lasts[last]) / 2
+    nothing = np.zeros((m, 3))
     x = replace(
-        x, t=x.t + rest, since_start=x.since_start + rest, lasts=np.zeros(1),
-        f=felt[None, :3], w=felt[None, 3:], w_dot=nothing, variance=nothing,
-        heating=np.zeros(1), since_turn=np.full(1, np.inf),
+        x, t=x.t + rest, since_start=x.since_start + rest, lasts=np.zeros(m),
+        f=felt[:, :3], w=felt[:, 3:], w_dot=nothing, variance=nothing,
+        heating=np.zeros(m), since_turn=np.full(m, np.inf),
         joint_turns=JointTurns.none(),
     )  # fmt: skip
     nowhere = State(
         np.zeros(6), np.ones(6), np.zeros((d.position_count, 2)), np.zeros(3)
     )
-    view = RowView(x, x, np.full((len(d.since), 1), np.inf), nowhere)
-    out = np.zeros((6, d.width))
+    view = RowView(x, x, np.full((len(d.since), m), np.inf), nowhere)
+    out = np.zeros((m, 6, d.width))
     for first, end, basis in d.basis_ranges():
         if not changing[first:end].any():
             continue
-        row = basis.evaluate(view)[0]
-        out[:, first:end] = (
-            np.kron(np.eye(6), row) if isinstance(basis, Course) else row
-        )
+        table = basis.evaluate(view)
+        if isinstance(basis, Course):
+            table = np.kron(np.eye(6), table[:, None])
+        out[:, :, first:end] = table
     return np.where(changing, out, 0.0)

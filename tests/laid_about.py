@@ -9,6 +9,12 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 G = 9.80665
+COLUMNS = "t,ax,ay,az,gx,gy,gz"
+GYR = {"rad/s": 1.0, "deg/s": 180 / np.pi} | {
+    f"{lsb} in deg/s": lsb * 180 / np.pi for lsb in (131.072, 65.536, 32.768, 16.384)
+}
+"""What 1 rad/s is, by the unit."""
+
 SIDES = [(0, 0, 1), (0, 1, 0), (0, 0, -1), (1, 0, 0), (0, -1, 0), (-1, 0, 0), (0, 0, 1)]
 
 

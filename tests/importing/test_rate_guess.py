@@ -7,20 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from joined import read_files
-from laid_about import turned, write
+from laid_about import COLUMNS, GYR, G, turned, write
 
 from fieldcal.cli import main
 from fieldcal.session.folder import Session
-
-G = 9.80665
-COLUMNS = "t,ax,ay,az,gx,gy,gz"
-ACC = {"m/s^2": 1.0, "g": 1 / G, "mg": 1000 / G} | {
-    f"{lsb} in g": lsb / G for lsb in (16384, 8192, 4096, 2048)
-}
-GYR = {"rad/s": 1.0, "deg/s": 180 / np.pi} | {
-    f"{lsb} in deg/s": lsb * 180 / np.pi for lsb in (131.072, 65.536, 32.768, 16.384)
-}
-TIME = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from joined import read_files
-from laid_about import turned, write
+from laid_about import COLUMNS, GYR, G, turned, write
 
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
@@ -18,13 +18,8 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.session.folder import Session
 
-G = 9.80665
-COLUMNS = "t,ax,ay,az,gx,gy,gz"
 ACC = {"m/s^2": 1.0, "g": 1 / G, "mg": 1000 / G} | {
     f"{lsb} in g": lsb / G for lsb in (16384, 8192, 4096, 2048)
-}
-GYR = {"rad/s": 1.0, "deg/s": 180 / np.pi} | {
-    f"{lsb} in deg/s": lsb * 180 / np.pi for lsb in (131.072, 65.536, 32.768, 16.384)
 }
 TIME = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 

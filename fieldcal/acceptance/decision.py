@@ -22,6 +22,7 @@ from fieldcal.acceptance.agreement import (
 from fieldcal.acceptance.angles import ANGLES, check_angles
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.check import Check
+from fieldcal.acceptance.common_rotation import check_common_rotation
 from fieldcal.acceptance.conditions import check_link, check_temperature
 from fieldcal.acceptance.factory import check_factory_errors
 from fieldcal.acceptance.growth import TIMES, NavigationErrors, navigation_errors
@@ -118,6 +119,7 @@ def decide(
             calibration, about, limits, circumstances.verification, circumstances.family
         ),
         *check_factory_errors(calibration, about, limits),
+        *check_common_rotation(calibration, limits),
         *check_level(calibration, about),
         *check_uncertainty(calibration, about, limits, circumstances.windows),
         *check_site(calibration, about),

@@ -96,7 +96,7 @@ def _settled_state(
 ) -> tuple[State, Array]:
     """The state to which the set converges, and the values of its columns there."""
     start: Array = np.zeros(parameter_set.width)
-    state, values, _ = fit.settle(fit.nominal, start, parameter_set.members)
+    state, values, _ = fit.approach(fit.nominal, start, parameter_set.members)
     if fit.turns is None:
         return state, values
     # windows measure only the Earth's rate: too little for scale factors of gyroscopes
@@ -109,7 +109,7 @@ def _settled_state(
         if again:
             fit.follow_turns(state, values)
         before = state.scale
-        state, values, _ = fit.settle(state, values, parameter_set.members)
+        state, values, _ = fit.approach(state, values, parameter_set.members)
         if np.abs(state.scale / before - 1).max() < tolerances.MIN_SCALE_CHANGE:
             break
     return state, values
@@ -129,7 +129,7 @@ def _follow_turns_first(
         return state, values
     zeros: Array = np.zeros(parameter_set.width)
     if _contradicted_turns(fit, fit.nominal, zeros) < contradicted:
-        state, values, _ = fit.settle(fit.nominal, zeros, parameter_set.members)
+        state, values, _ = fit.approach(fit.nominal, zeros, parameter_set.members)
         return state, values
     fit.follow_turns(state, values)
     return state, values

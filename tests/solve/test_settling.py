@@ -49,7 +49,7 @@ class MadeUp:
         self.turns = "turns" if self.has_turns else None
         self.contradicted_turns: tuple[None, ...] = ()
 
-    def settle(self, start: State, values: Array, members: Any) -> Any:
+    def approach(self, start: State, values: Array, members: Any) -> Any:
         assert members == "members"
         self.done.append(("settle", float(start.scale[0])))
         self.zeroed.append(not values[SCALE + 3 : SCALE + 6].any())

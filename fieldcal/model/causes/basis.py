@@ -19,6 +19,9 @@ from fieldcal.physics.experience import Experience
 
 CentralDifference = tuple[Experience, Experience, float]
 
+Sides = Callable[["RowView"], Iterator[CentralDifference]]
+"""Inputs for each of some parameters, a step up and a step down, and the step."""
+
 
 @dataclass(frozen=True, slots=True)
 class RowView:
@@ -30,7 +33,7 @@ class RowView:
     x : inputs of the device with them
     since : (o, n) s since the turn, by origin of the time
     state : the base state
-    rotations : cached result of `small_rotation`
+    differences : columns that were calculated as central differences, by their sides
 
     """
 
@@ -44,7 +47,9 @@ class RowView:
     )
     _rotated: list[Experience] = field(default_factory=list, init=False, repr=False)
     _turned: list[Experience] = field(default_factory=list, init=False, repr=False)
-    rotations: list[Array] = field(default_factory=list, init=False, repr=False)
+    differences: dict[Sides, Array] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @classmethod
     def of(cls, plain: Experience, since: Array, state: State) -> RowView:
@@ -71,10 +76,6 @@ class RowView:
             since_origin = replace(self.x, since_turn=self.since[origin])
             self._by_origin[origin] = since_origin
         return self._by_origin[origin]
-
-
-Sides = Callable[[RowView], Iterator[CentralDifference]]
-"""Inputs for each of some parameters, a step up and a step down, and the step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,14 +118,16 @@ class General:
 
 
 def central_differences(sides: Sides) -> Callable[[RowView], Array]:
-    """Columns as central differences over the inputs."""
+    """Columns as central differences over the inputs; calculated once for some rows."""
 
     def of(view: RowView) -> Array:
-        columns = [
-            output_derivative(up, down, step, view.state)
-            for up, down, step in sides(view)
-        ]
-        return np.stack(columns, axis=2)
+        if sides not in view.differences:
+            columns = [
+                output_derivative(up, down, step, view.state)
+                for up, down, step in sides(view)
+            ]
+            view.differences[sides] = np.stack(columns, axis=2)
+        return view.differences[sides]
 
     return of
 

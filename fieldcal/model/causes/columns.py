@@ -18,7 +18,6 @@ from fieldcal.model.causes.basis import (
     CentralDifference,
     RowView,
     central_differences,
-    output_derivative,
 )
 from fieldcal.model.state import State, perpendicular_vectors
 from fieldcal.physics.experience import Experience
@@ -158,19 +157,16 @@ def small_rotation_sides(view: RowView) -> Iterator[CentralDifference]:
 
 
 def small_rotation(view: RowView) -> Array:
-    """Columns of two small rotations of every position, (n, 6, 2 p); cached."""
-    if not view.rotations:
-        view.rotations.append(_small_rotation(view))
-    return view.rotations[0]
-
-
-def _small_rotation(view: RowView) -> Array:
-    """Calculate the columns of `small_rotation`."""
+    """Columns of two small rotations of every position, (n, 6, 2 p)."""
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
     at = view.nominal.position
     held = np.flatnonzero(at >= 0)
-    for joint, (up, down, step) in enumerate(small_rotation_sides(view)):
-        change = output_derivative(up, down, step, view.state)
-        out[held, :, 2 * at[held] + joint] = change[held]
+    change = all_rotated(view)[held]
+    for joint in range(2):
+        out[held, :, 2 * at[held] + joint] = change[:, :, joint]
     return out
+
+
+all_rotated = central_differences(small_rotation_sides)
+"""Columns of two small rotations that all positions have in common, (n, 6, 2)."""

@@ -153,13 +153,24 @@ class GaussNewton:
         sizes: Sizes | None = None,
     ) -> tuple[State, Array, Set]:
         """The state at the estimate of a set, by Gauss and Newton, and that set."""
-        state, values = self._near_set_angles(state, self.pad(values), members)
+        _, before, settled = self.approach(state, values, members, sizes)
+        return *self._step_towards(settled, before), settled
+
+    def approach(
+        self,
+        state: State,
+        values: Array,
+        members: tuple[Member, ...],
+        sizes: Sizes | None = None,
+    ) -> tuple[State, Array, Set]:
+        """A state as near to the estimate of a set as counts, and the set about it."""
+        there = self._near_set_angles(state, self.pad(values), members)
         for _ in range(tolerances.MAX_RELINEARISATIONS):
+            state, values = there
             settled, _ = self.estimate(state, values, members, sizes)
             sizes = settled.sizes
-            before = values
-            state, values = self._step_towards(settled, before)
-            if self.largest_step(settled, before, values) < tolerances.CONVERGED:
+            there = self._step_towards(settled, values)
+            if self.largest_step(settled, values, there[1]) < tolerances.CONVERGED:
                 break
         return state, values, settled
 

@@ -27,6 +27,7 @@ class WindowSystem(System):
         super().__init__(dictionary)
         self.rows = rows
         self._last: tuple[State, int, list[LinearRows]] | None = None
+        self._view: RowView | None = None
 
     def linearised(self, state: State, wanted: Mask | None = None) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted.
@@ -80,7 +81,9 @@ class WindowSystem(System):
 
     def _about(self, state: State) -> tuple[Callable[[Basis], Array], Array]:
         """What evaluates a basis about a state; recorded less calculated, (n, 6)."""
-        view = RowView.of(self.rows.x, self.dictionary.since, state)
+        view = self._view
+        if view is None or view.state is not state:
+            view = self._view = RowView.of(self.rows.x, self.dictionary.since, state)
         off = self.rows.y - state.output(view.x, view.since)
         return (lambda basis: basis.evaluate(view)), off
 

@@ -224,6 +224,18 @@ def test_a_settled_state_stays() -> None:
     np.testing.assert_allclose(state.bias, found.state.bias, atol=1e-4)
 
 
+def test_a_set_is_settled_one_step_from_where_its_rows_were_linearised() -> None:
+    fit, members = settling().fit, settling().best.members
+    zeros = np.zeros(fit.dictionary.width)
+    state, values, about = fit.approach(nominal(), zeros, members)
+    again, _ = fit.estimate(state, values, members, about.sizes)
+    np.testing.assert_allclose(again.state.estimate, about.state.estimate, atol=1e-9)
+    _, settled, same = fit.settle(nominal(), zeros, members)
+    np.testing.assert_array_equal(same.state.estimate, about.state.estimate)
+    np.testing.assert_array_equal(settled, fit.state_at_estimate(about)[1])
+    assert 0 < fit.largest_step(about, values, settled) < 0.03
+
+
 def test_wanted_are_columns_of_the_set_and_what_is_always_there() -> None:
     found, d = settling(), settling().fit.dictionary
     wanted = found.fit.wanted_columns(found.best.members)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,12 @@ from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
+from fieldcal.model.causes.basis import (
+    CentralDifference,
+    General,
+    RowView,
+    central_differences,
+)
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.state import State, Term
@@ -57,6 +64,28 @@ def away(x: Experience) -> State:
         np.array([2e-5, -5e-5, 4e-5]),
         terms,
     )
+
+
+def test_columns_by_differences_are_calculated_once_about_a_state() -> None:
+    """Also if other columns are asked for there as well."""
+    d, at = dictionary(x := ladder(2)), list[State]()
+
+    def sides(view: RowView) -> Iterator[CentralDifference]:
+        at.append(view.state)
+        yield replace(view.x, f=view.x.f + 0.5), view.x, 0.25
+
+    (own,) = d.add(General("made up", central_differences(sides)), 1)
+    system, wanted = WindowSystem(rows_of(x, np.hstack([x.f, x.w])), d), d.typical < 0
+    wanted[own] = True
+    one, other = away(x), replace(away(x), bias=np.zeros(6))
+    first = system.linearised(one, wanted)
+    system.linearised(one)
+    system.linearised(other, wanted)
+    again = system.linearised(one, wanted)
+    assert [id(state) for state in at] == [id(one), id(other), id(one)]
+    for part, same in zip(first, again, strict=True):
+        np.testing.assert_array_equal(part.design, same.design)
+        assert part.design.any() or part.channel > 2
 
 
 def output(d: Dictionary, state: State) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.state import State
-from fieldcal.physics.effect import NO_SHAPE, Sensor, outputs_at
+from fieldcal.physics.effect import NO_SHAPE, BiasChange, Sensor, outputs_at
 from fieldcal.physics.experience import Experience
 
 CentralDifference = tuple[Experience, Experience, float]
@@ -141,7 +141,8 @@ def output_derivative(
     """
     change: Array = np.hstack([up.f - down.f, up.w - down.w]) * state.scale
     for term in state.terms:
-        if isinstance(term.effect, Sensor):
+        # a change of a bias is the same for all inputs
+        if isinstance(term.effect, Sensor) and not isinstance(term.effect, BiasChange):
             shape = term.shape or NO_SHAPE
             ends = (term.effect.design(x, shape) for x in (up, down))
             at_up, at_down = (outputs_at(design, term.values) for design in ends)

@@ -114,18 +114,25 @@ def divide_into_steps(leg: Leg) -> Steps | None:
     return Steps(first, t, each, np.arange(count + 1) * each, cut)
 
 
-def integrate_turn(leg: Leg, steps: Steps, known_errors: Array) -> IntegratedTurn:
+def integrate_turn(
+    leg: Leg, steps: Steps, known_errors: Array, before: IntegratedTurn | None = None
+) -> IntegratedTurn:
     """Integrate a turn.
 
     `known_errors` (m + 1, 3), rad/s at the edges, are subtracted from the outputs.
+    `before` is the turn integrated with nearly the same ones: it carries the Earth's
+    rate as well.
     """
     x, t, edge = leg.x, steps.t, steps.edge
-    part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
     ends = [x.w[x.position == p].mean(axis=0) for p in leg.pair]
-    earth = (1 - part) * ends[0] + part * ends[1]
     rate = _angular_rates(leg, t, _interpolated(t, steps.at, known_errors))
-    # first with the Earth's rate interpolated in time, then carried by the attitude
-    for _ in range(2):
+    if before is None:
+        # first with the Earth's rate interpolated in time, then carried by the attitude
+        part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
+        earth, rounds = (1 - part) * ends[0] + part * ends[1], 2
+    else:
+        earth, rounds = before.earth, 1
+    for _ in range(rounds):
         angle = small_turns(t, rate - earth, edge) / leg.source.pace
         size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
         attitude, done = attitudes_from_rotations(angle), size / size[-1]

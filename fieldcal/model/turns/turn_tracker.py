@@ -156,8 +156,9 @@ class TurnTracker:
         correction: Array = np.zeros((len(steps.edge), 3))
         rows = first_row_of_each(leg.x, leg.pair)
         forces, held = leg.x.f[rows], leg.x.to_device_in(rows)
+        last: IntegratedTurn | None = None
         for _ in range(tolerances.MAX_CORRECTIONS):
-            integrated = integrate_turn(leg, steps, correction)
+            last = integrated = integrate_turn(leg, steps, correction, last)
             x = self._edges(leg, steps, integrated, forces, held)
             force_before_effects, x = x.f, apply_way_effects(x, state)
             before, since = correction, self.time_since_turn(steps.at, leg.pair[1])

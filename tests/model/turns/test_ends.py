@@ -254,9 +254,16 @@ def test_the_earth_turns_with_the_device_on_the_way() -> None:
     x = replace(one.x, w=np.array([start] * 3 + [end] * 2))
     steps = divide_into_steps(one)
     assert steps is not None
-    found = integrate_turn(replace(one, x=x), steps, np.zeros((len(steps.edge), 3)))
+    one, none = replace(one, x=x), np.zeros((len(steps.edge), 3))
+    found = integrate_turn(one, steps, none)
     turned = rotation_matrices(-found.rate * (steps.t - steps.t[0])[:, None]) @ start
     np.testing.assert_allclose(found.earth, turned, atol=1e-8)
+    less = none + [0.0, 0.0, 1e-3]
+    near = integrate_turn(one, steps, less, found)
+    np.testing.assert_allclose(
+        near.attitude, integrate_turn(one, steps, less).attitude, rtol=0, atol=1e-7
+    )
+    assert np.abs(near.attitude[-1] - found.attitude[-1]).max() > 1e-3
 
 
 def test_rates_that_are_late_are_taken_later() -> None:

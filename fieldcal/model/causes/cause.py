@@ -93,17 +93,18 @@ class Group:
         return [self.effect.params[j].name for j in self.params] if self.effect else []
 
     @property
-    def leading_columns(self) -> Index:
-        """Indices, within the group, of the columns of largest typical size.
+    def leading(self) -> tuple[Index, Array]:
+        """The columns of largest typical size, and these sizes, in their order.
 
         They predict the gain of log evidence by the group. The fast cosines of a course
         hardly change this gain, except for a random walk far above the noise. They are
         all columns if the group has at most `tolerances.MAX_OFFERED_COLUMNS`.
         """
         if len(self.columns) <= tolerances.MAX_OFFERED_COLUMNS:
-            return np.arange(len(self.columns))
+            return self.columns, self.typical
         order = np.argsort(-self.typical, kind="stable")
-        return np.sort(order[: tolerances.MAX_OFFERED_COLUMNS])
+        largest = np.sort(order[: tolerances.MAX_OFFERED_COLUMNS])
+        return self.columns[largest], self.typical[largest]
 
     def with_same_parameters(self, others: Iterable[Group]) -> list[Group]:
         """Groups among `others` with the same parameters, origin and positions."""
@@ -288,9 +289,10 @@ class EqualWidthGroups:
     @classmethod
     def of(cls, groups: Sequence[tuple[int, int, Group]]) -> EqualWidthGroups:
         """Stack groups; each is given with the indices of its cause and variant."""
-        columns = np.array([g.columns[g.leading_columns] for _, _, g in groups])
+        leading = [group.leading for _, _, group in groups]
+        columns = np.array([columns for columns, _ in leading])
         blocks, block = np.unique(columns, axis=0, return_inverse=True)
-        typical = np.array([g.typical[g.leading_columns] for _, _, g in groups])
+        typical = np.array([sizes for _, sizes in leading])
         cause, variant = np.array([(i, j) for i, j, _ in groups]).T
         known = np.array([g.fixed_size == 1.0 for _, _, g in groups])
         return cls(blocks, block.ravel(), typical, cause, variant, known)

@@ -149,9 +149,8 @@ class Dictionary(ColumnTable):
         by_width: dict[int, list[tuple[int, int, Group]]] = {}
         for i, cause in enumerate(self.causes):
             for j, group in enumerate(cause.variants):
-                by_width.setdefault(len(group.leading_columns), []).append(
-                    (i, j, group)
-                )
+                width = len(group.leading[0])
+                by_width.setdefault(width, []).append((i, j, group))
         return [EqualWidthGroups.of(groups) for groups in by_width.values()]
 
     @cached_property

@@ -359,9 +359,12 @@ def test_the_largest_columns_of_a_wide_group() -> None:
     typical = np.r_[np.linspace(5.0, 1.0, 70), np.linspace(0.5, 4.0, 30)]
     group = Group("time", "ax", np.arange(200, 300), typical)
     largest = np.sort(np.argsort(-typical)[:60])
-    np.testing.assert_array_equal(group.leading_columns, largest)
+    columns, sizes = group.leading
+    np.testing.assert_array_equal(columns, 200 + largest)
+    np.testing.assert_array_equal(sizes, typical[largest])
     few = Group("time", "ax", np.arange(60), typical[:60])
-    np.testing.assert_array_equal(few.leading_columns, np.arange(60))
+    np.testing.assert_array_equal(few.leading[0], np.arange(60))
+    np.testing.assert_array_equal(few.leading[1], typical[:60])
 
 
 def test_names_of_causes_and_triads() -> None:
@@ -406,9 +409,9 @@ def test_chances_are_shared_among_variants_and_follow_changes() -> None:
             alike.cause, alike.variant, alike.blocks[alike.block], alike.typical,
             strict=True,
         ):  # fmt: skip
-            group = d.causes[i].variants[j]
-            np.testing.assert_array_equal(block, group.columns[group.leading_columns])
-            np.testing.assert_array_equal(typical, group.typical[group.leading_columns])
+            columns, sizes = d.causes[i].variants[j].leading
+            np.testing.assert_array_equal(block, columns)
+            np.testing.assert_array_equal(typical, sizes)
 
 
 def test_the_first_linearisation_tells_which_columns_windows_show() -> None:

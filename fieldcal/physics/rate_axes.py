@@ -70,10 +70,10 @@ def axes_by_turns(turns: Sequence[ObservedTurn]) -> Array | None:
     if len(turns) < MIN_TURNS:
         return None
     every = signed_axes()
-    each = [_closure_angles(one, every) for one in turns]
-    # few axes are turned about in many turns; a fifth may have been followed badly
-    missed = np.quantile(each, FOLLOWED, axis=0, method="higher")
-    if missed.min() > CLOSES or missed[0] < CLOSES:
+    if _missed_angles(turns, every[:1])[0] < CLOSES:
+        return None
+    missed = _missed_angles(turns, every)
+    if missed.min() > CLOSES:
         return None
     near = np.flatnonzero(
         missed <= MIN_CLOSURE_RATIO * max(missed.min(), SAME_CLOSURE_RAD)
@@ -84,12 +84,20 @@ def axes_by_turns(turns: Sequence[ObservedTurn]) -> Array | None:
     return every[near[0]] if len(near) == 1 else None
 
 
+def _missed_angles(turns: Sequence[ObservedTurn], every: Sequence[Array]) -> Array:
+    """What most turns miss by at most with each P, rad."""
+    each = [_closure_angles(one, every) for one in turns]
+    # few axes are turned about in many turns; a fifth may have been followed badly
+    missed: Array = np.quantile(each, FOLLOWED, axis=0, method="higher")
+    return missed
+
+
 def _closure_angles(turn: ObservedTurn, every: Sequence[Array]) -> list[float]:
     """Angle between where gravity is and where each P leads it, rad, (1)."""
-    ways = {sign: _rotation_product(sign * turn.angles) for sign in (1.0, -1.0)}
+    signs = [round(float(np.linalg.det(axes))) for axes in every]
+    ways = {sign: _rotation_product(sign * turn.angles) for sign in {*signs}}
     out = []
-    for axes in every:
-        sign = float(np.sign(np.linalg.det(axes)))
+    for axes, sign in zip(every, signs, strict=True):
         proper = sign * axes
         led = proper @ ways[sign] @ proper.T @ turn.before  # (2)
         sine = float(np.linalg.norm(cross(led, turn.behind)))

@@ -9,6 +9,7 @@ from fieldcal.diagnosis.factory_left import factory_error_groups
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model import thresholds
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.smoothing_left import UndoneSmoothing
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.rows.averages import Rows
@@ -40,6 +41,7 @@ def build_fit(prepared: PreparedRecording) -> GaussNewton:
         turned, Wander.of(rows, unit), rows.session_error,
     )  # fmt: skip
     dictionary.unfitted = tuple(factory_error_groups(dictionary, about, prepared))
+    dictionary.always += UndoneSmoothing.of(source).groups(dictionary)
     dictionary.add_instants(change_points(rows).tolist())
     dictionary.expect_within(possible_restarts(source.block, about))
     grain = rounding_noise(source.block, window_bounds(source.block, about))

@@ -16,6 +16,7 @@ from fieldcal.diagnosis.signal.chain import (
     CheckedRecording,
     check_chain,
     recheck_without_lines,
+    with_undone_smoothing,
 )
 from fieldcal.diagnosis.signal.line import LineRemainder, SpectralLine
 from fieldcal.diagnosis.signal.spectrum import find_lines, subtract_lines
@@ -79,6 +80,7 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     known = known_terms(about.model)
     checked = check_chain(block, about)
     about = about.with_scaled_angles(checked.angle_factor)
+    about = with_undone_smoothing(about, checked.faults)
     checked, source = _checked_source(checked, about)
     rows = rows_of_recording(source)
     _refuse_turning(rows, about)

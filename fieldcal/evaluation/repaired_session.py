@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fieldcal.calibration import Calibration
-from fieldcal.diagnosis.signal.chain import repair_samples
+from fieldcal.diagnosis.signal.chain import repair_samples, with_undone_smoothing
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain
 from fieldcal.session.folder import Session
@@ -33,7 +33,8 @@ def repaired_session(session: Session) -> tuple[Session, tuple[str, ...]]:
     if not faults:
         return session, ()
     refuse_samples_of_no_imu(session.block, session.about.windows)
-    right = replace(session, warnings=())
+    about = with_undone_smoothing(session.about, faults)
+    right = replace(session, about=about, warnings=())
     right.__dict__["block"] = block
     effects = catalogue()
     said = (

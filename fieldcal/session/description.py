@@ -62,6 +62,9 @@ class Description:
         contain them, s, in order
     gaps_without_restart : (last, first) time of the samples around each gap through
         which the device's clock, which begins anew at a restart, went on, s
+    smoothing : (2, 2) time constants of a smoothing that was undone in the samples of
+        accelerometers and of gyroscopes, and their standard deviations, s; 0 if there
+        was none
 
     """
 
@@ -91,6 +94,7 @@ class Description:
     excluded_spans: tuple[tuple[float, float], ...]
     gaps_without_restart: tuple[tuple[float, float], ...]
     raw: Mapping[str, Any] = field(repr=False)
+    smoothing: Array
 
     @property
     def mounting(self) -> Array:

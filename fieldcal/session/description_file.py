@@ -126,6 +126,7 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
         excluded_spans=excluded_spans(raw.get("position", ())),
         gaps_without_restart=(),
         raw=raw,
+        smoothing=np.zeros((2, 2)),
     )
 
 

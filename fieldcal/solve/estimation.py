@@ -16,6 +16,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.known_rows import KnownRows
+from fieldcal.model.causes.smoothing_left import UndoneSmoothing
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.unfitted_groups import chances_of_coarser
 from fieldcal.model.posterior.mixture import Mixture
@@ -237,6 +238,10 @@ def estimate_parameters(
         recorded.rows, np.abs(nominal.scale), recorded.since_turn, turning is not None,
         wanted, recorded.explanations, recorded.cut_sigma,
     )  # fmt: skip
+    if recorded.source is not None:
+        parameter_set.always += UndoneSmoothing.of(recorded.source).groups(
+            parameter_set
+        )
     parameter_set.known = _known_rows(parameter_set, recorded, nominal)
     turns = None if turning is None else Turns(turning, parameter_set, False)
     fit = settle_without_bad_windows(recorded.rows, parameter_set, nominal, turns)

@@ -37,6 +37,9 @@ def test_samples_are_those_of_the_device_without_the_program(folder: Path) -> No
     right, (said,) = repaired_session(Session.open(folder))
     tau = float(said.split("time constant of ")[1].split()[0])
     assert tau == pytest.approx(TAU, rel=0.03)
+    seconds, sigma = right.about.smoothing
+    assert seconds[0] == seconds[1] == pytest.approx(tau, rel=0.03)
+    assert np.all((0 < sigma) & (np.abs(seconds - TAU) < 4 * sigma))
     plain = recorded(CALM, HELD)
     still = np.abs(right.block.six - plain.six)[plain.t > plain.t[-1] - 5.0]
     noise = np.diff(plain.six, axis=0).std(axis=0)

@@ -7,6 +7,7 @@ bumped), and other faults are only reported (lost samples, the clock, coarse ste
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -158,6 +159,20 @@ def repair_samples(
     usable = np.isfinite(block.six)
     block, _ = _correct(block, usable, about, faults, described=True)
     return block, [(name, fault) for name, fault in faults if fault.mended is not None]
+
+
+def with_undone_smoothing(
+    about: Description, faults: Iterable[tuple[str, Fault]]
+) -> Description:
+    """The description with what is known of a smoothing that was undone."""
+    fault = next((found for name, found in faults if name == "smoothing"), None)
+    if fault is None:
+        return about
+    by_sensor = [
+        [float(known.get(part, 0.0)) for part in ("acc", "gyr")]
+        for known in (fault.values, fault.sigmas)
+    ]
+    return replace(about, smoothing=np.array(by_sensor))
 
 
 def recheck_without_lines(

@@ -1,0 +1,127 @@
+"""What is left of a smoothing whose time constant is not known exactly.
+
+The smoothed outputs y of a device follow its outputs x by tau y' = x - y. What was
+calculated from y with a time constant that is too short by e is
+
+    x - (y + (tau - e) y') = e y'                                                   (1)
+
+late by e. In a row of a window this is the change of y from one end to the other, over
+the length of the row: nothing but where y still settles. There y' is that of a device
+at rest, as the noise of y is the noise of the row itself. During a turn the gyroscopes
+lack e y' all the way. Source: model of this project.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import ACC, GYR, Array, Block, Index
+from fieldcal.model.causes.basis import General, RowView
+from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.rows.row_source import RowSource
+from fieldcal.model.rows.window_bounds import window_bounds
+from fieldcal.physics.experience import Experience
+
+SMOOTHING = "smoothing"
+"""Part of the group; the id of the effect that is undone."""
+
+
+@dataclass(frozen=True, eq=False)
+class UndoneSmoothing:
+    """A smoothing that was undone in the outputs of some sensors.
+
+    Attributes
+    ----------
+    block : the outputs x
+    windows : (p, 2) first and one past the last sample of each window
+    seconds, sigma : (2,) time constant of accelerometers and of gyroscopes, and its
+        standard deviation, s; 0 where they were not smoothed
+
+    """
+
+    block: Block
+    windows: Index
+    seconds: Array
+    sigma: Array
+
+    @classmethod
+    def of(cls, source: RowSource) -> UndoneSmoothing:
+        """What session.toml and the repairs of the samples say of a recording."""
+        windows = window_bounds(source.block, source.about)
+        return cls(source.block, windows, *source.about.smoothing)
+
+    def groups(self, table: ColumnTable) -> Iterator[Group]:
+        """Group of e: one of both sensors where one program smoothed them alike."""
+        smoothed = np.flatnonzero(self.seconds)
+        if not len(smoothed):
+            return
+        alike = len(smoothed) == 2 and np.ptp(self.seconds) == 0
+        parts = [[ACC, GYR]] if alike else [[(ACC, GYR)[i]] for i in smoothed]
+        y = self._smoothed()
+
+        def columns(view: RowView) -> Array:
+            """Slope of y in each row, (1), by the sensors of each part: (n, 6, k)."""
+            out = np.zeros((len(view.x), 6, len(parts)))
+            slope = y.slope(view.x.t, _lengths(view.x))
+            for k, triads in enumerate(parts):
+                for triad in triads:
+                    out[:, triad, k] = slope[:, triad]
+            return out
+
+        at = table.add(General(SMOOTHING, columns, needs_whole_turn=True), len(parts))
+        yield Group("device", SMOOTHING, at, self.sigma[smoothed[: len(parts)]],
+                    fixed_size=1.0)  # fmt: skip
+
+    def _smoothed(self) -> SmoothedOutputs:
+        """The outputs y, without noise in windows."""
+        # loading it takes 0.1 s, and few recordings are smoothed
+        from scipy.signal import lfilter
+
+        t, six = self.block.t, _last_known(self.block.six)
+        for a, b in self.windows.tolist():
+            if b > a:
+                six[a:b] = six[a:b].mean(axis=0)
+        interval = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+        for triad, tau in zip((ACC, GYR), self.seconds.tolist(), strict=True):
+            if tau:
+                share = float(np.exp(-interval / tau))
+                begin = share * six[:1, triad]
+                six[:, triad], _ = lfilter(
+                    [1 - share], [1, -share], six[:, triad], axis=0, zi=begin
+                )
+        return SmoothedOutputs(t, six)
+
+
+def _lengths(x: Experience) -> Array:
+    """What each row is a mean over, or how far apart edges of a turn are, s: (n,)."""
+    apart = np.gradient(x.t) if len(x) > 1 else np.ones(len(x))
+    return np.where(x.lasts > 0, x.lasts, apart)
+
+
+def _last_known(six: Array) -> Array:
+    """Outputs (n, 6) of which a missing one keeps the value of the previous sample."""
+    at = np.where(np.isfinite(six), np.arange(len(six))[:, None], 0)
+    last = np.maximum.accumulate(at, axis=0)
+    out: Array = np.nan_to_num(np.take_along_axis(six, last, axis=0))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothedOutputs:
+    """Outputs y (n, 6) at the instants t (n,), s."""
+
+    t: Array
+    y: Array
+
+    def slope(self, t: Array, lasts: Array) -> Array:
+        """Mean of y' over `lasts` (m,) about the instants t (m,), s: (m, 6)."""
+        change = [
+            np.interp(t + lasts / 2, self.t, y) - np.interp(t - lasts / 2, self.t, y)
+            for y in self.y.T
+        ]
+        out: Array = np.stack(change, axis=1) / lasts[:, None]
+        return out

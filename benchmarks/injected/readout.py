@@ -6,7 +6,8 @@ rounded to steps q becomes
     U + q round(d / q + u),   u even in (-1/2, 1/2)
 
 as what the rounding had cut off is not known: right in the mean, whatever d is.
-Samples at a rail stay there.
+Samples at a rail stay there. A text has its outputs in few decimals, and so have those
+that are changed.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from fieldcal.core.samples import Array
 
 FEWEST, MORE = 5, 4.0
 """Samples that make a rail, if they are so many more than at the value next to it."""
+
+DECIMALS = range(10)
+"""Of a text; what has more is no decimal number."""
 
 NEAR = 20.0
 """Steps within which gaps tell a grid; a text's decimals add up over wider ones."""
@@ -43,6 +47,19 @@ def grid(values: Array) -> float:
     return step if float(off.max()) < 0.1 else 0.0
 
 
+def in_decimals(changed: Array, before: Array) -> Array:
+    """Values in as many decimals as a text had before; as they are if it had none.
+
+    >>> in_decimals(np.array([0.30213]), np.array([0.3, 0.32]))
+    array([0.3])
+    """
+    known = before[np.isfinite(before)]
+    for d in DECIMALS:
+        if np.allclose(known, np.round(known, d), rtol=1e-9, atol=1e-13):
+            return np.round(changed, d)
+    return changed
+
+
 def rails(values: Array) -> tuple[float, float]:
     """Lowest and highest value that a channel can put out, as far as it shows."""
     levels, counts = np.unique(values[np.isfinite(values)], return_counts=True)
@@ -62,7 +79,8 @@ def put_out(six: Array, change: Array, rng: np.random.Generator) -> Array:
         step = grid(six[:, c])
         if step > 0:
             unknown = rng.uniform(-0.5, 0.5, len(six))
-            out[:, c] = six[:, c] + step * np.round(change[:, c] / step + unknown)
+            whole = six[:, c] + step * np.round(change[:, c] / step + unknown)
+            out[:, c] = in_decimals(whole, six[:, c])
         low, high = rails(six[:, c])
         there: NDArray[np.bool_] = (six[:, c] <= low) | (six[:, c] >= high)
         out[:, c] = np.where(there, six[:, c], np.clip(out[:, c], low, high))

@@ -23,6 +23,9 @@ certain: what a device counts and a program writes in decimals has no two neighb
 Any gap is within 5 % of a whole number by chance once in ten times."""
 
 
+REACHES = (4.0, 32.0, 256.0, np.inf)
+"""Largest of the gaps that tell a step, in the least: better and better."""
+
 FEW_GAPS = 100
 """Gaps that are looked at before all others."""
 
@@ -221,15 +224,20 @@ def step_between(shown: Array) -> float:
 
 
 def _grid(gaps: Array, step: float) -> float:
-    """Step of which all gaps are multiples, about a first guess; 0 if there is none."""
-    total, widest = float(gaps.sum()), float(gaps.max())
-    for _ in range(3):  # the grid's own step is the mean over many, not one difference
-        most = 0.1 + 0.02 * round(widest / step) ** 0.5
+    """Step of which all gaps are multiples, about a first guess; 0 if there is none.
+
+    The least gap of a text with few decimals may be some percent off: gaps of a few
+    steps tell the step well enough for those of many.
+    """
+    least = float(gaps.min())
+    for reach in REACHES:
+        near = gaps[gaps < reach * least]
+        most = 0.1 + 0.02 * round(float(near.max()) / step) ** 0.5
         # of what lies on no grid, the first few gaps tell it
-        for some in (gaps[:FEW_GAPS], gaps) if most < 0.5 else ():
+        for some in (near[:FEW_GAPS], near) if most < 0.5 else ():
             if _off_grid(some, step) > most:
                 return 0.0
-        step = total / float(np.round(gaps / step).sum())
+        step = float(near.sum()) / float(np.round(near / step).sum())
     return step if _off_grid(gaps, step) < 0.05 else 0.0
 
 

@@ -24,3 +24,19 @@ def test_few_values_that_lie_on_no_grid_show_none(many: int) -> None:
     rng = np.random.default_rng(4)
     shown = [lsb_of(rng.normal(size=many)) > 0 for _ in range(2000)]
     assert np.mean(shown) < (0.03 if many == 5 else 0.006)
+
+
+@pytest.mark.parametrize(
+    ("step", "decimals"),
+    [(9.80665 / 2048, 4), (9.80665 / 2048, 5), (0.0010652644, 5), (0.0010652644, 6)],
+)
+def test_a_text_of_few_decimals_shows_the_step_of_wide_counts(
+    step: float, decimals: int
+) -> None:
+    """The least gap is a percent off or two, and some lie thousands of steps apart."""
+    rng = np.random.default_rng(7)
+    near = np.unique(np.round(rng.normal(0.0, 300.0, 900)))
+    far = np.cumsum(rng.integers(100, 5000, 20)) + near[-1]
+    counts = np.concatenate([-far[::-1], near, far])
+    written = np.round(step * counts, decimals)
+    assert lsb_of(written) == pytest.approx(step, rel=1e-5)

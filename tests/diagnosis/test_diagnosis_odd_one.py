@@ -12,6 +12,7 @@ from ladder import LADDER, TACTICAL, Array, Fault, Ride, windows
 from ladder_sessions import agrees, diagnosed, hold_first, named
 
 from fieldcal.cli import main
+from fieldcal.diagnosis.findings.unknown_mismatch import list_positions
 from fieldcal.diagnosis.result import Diagnosis
 
 AMID = ((1, 6), pytest.param(5, len(LADDER), marks=pytest.mark.thorough))
@@ -172,8 +173,8 @@ def test_an_angle_that_is_wrong_each_time_is_said(
     _, _, rest = said.says.partition(f"{'αβ'[joint]} had been off by ")
     value, _, sigma = rest.partition(" deg")[0].split()
     assert abs(float(value) - off) < 4 * float(sigma) < 0.1
-    numbers = ", ".join(str(i + 1) for i in alike)
-    head = f"Set the angle {'αβ'[joint]} of positions {numbers} again and repeat these"
+    numbers = list_positions(alike)
+    head = f"Set the angle {'αβ'[joint]} of {numbers} again and repeat these"
     assert (
         f"{head} positions: {'αβ'[joint]} was off by {value} ± {sigma} deg"
         in said.next[0]
@@ -184,7 +185,7 @@ def test_an_angle_that_is_wrong_each_time_is_said(
     assert "repeated_angle" not in result.get("not_carried", {}).get("causes", {})
     assert not any("repeated_angle" in w for w in result["warnings"])
     (warning,) = (w for w in result["warnings"] if "the angle that was found" in w)
-    size = f"{'αβ'[joint]} was off by {value} ± {sigma} deg in positions {numbers}:"
+    size = f"{'αβ'[joint]} was off by {value} ± {sigma} deg in {numbers}:"
     assert f"a wrong angle, as {size}" in warning
     for name in ("acc_bias", "acc_scale", "gyr_bias"):
         found = result["parameters"][name]

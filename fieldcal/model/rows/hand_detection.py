@@ -122,9 +122,12 @@ def tremor_rms(values: Array, length: float, white: Array) -> Array:
     return out
 
 
-def force_wander_angle(rows: Rows) -> float:
+def force_wander_angle(rows: Rows, trembles: bool) -> float:
     """Rms angle by which the force turns within windows, rad; 0 on a table.
 
+    On a table that is shaken it varies along the force nearly as much as across it.
+    Where gyroscopes show that the device `trembles` in some windows only, more across
+    than along is enough: a hand that holds it in these holds it in others.
     A course that all windows share is subtracted: outputs that settle make one. The
     window that varies most does not count: a hand holds the others as well, and a knock
     or a jump of a bias is in one.
@@ -146,9 +149,8 @@ def force_wander_angle(rows: Rows) -> float:
         length = np.linalg.norm(rows.y[at, :3].mean(axis=0))
         angle.append(((off - part) ** 2).sum() / (2 * free) / length**2)
     across, along, dof = np.sum(sorted(squares, key=lambda s: s[0] / s[2])[:-1], axis=0)
-    if across / 2 < max(
-        dof + thresholds.DECIDES * np.sqrt(dof), detections.HELD_RATIO * along
-    ):
+    ratio = 1.0 if trembles else detections.HELD_RATIO
+    if across / 2 < max(dof + thresholds.DECIDES * np.sqrt(dof), ratio * along):
         return 0.0
     return float(np.sqrt(np.mean(angle)))
 

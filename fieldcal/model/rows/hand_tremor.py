@@ -58,7 +58,8 @@ def rows_of_recording(source: RowSource) -> Rows:
     bound = windows[held]
     block = masked(source.block, source.usable)
     pieces = [block[a:b] for a, b in bound]
-    angle = force_wander_angle(rows)
+    trembling = trembling_windows(rows, pieces, source.rate)
+    angle = force_wander_angle(rows, bool(trembling.any()))
     rounded = rounding_noise(block, bound).max(axis=0)
     noise = noise_beside_tremor(rows, pieces, rounded)
     if angle or noise is not None:
@@ -67,7 +68,6 @@ def rows_of_recording(source: RowSource) -> Rows:
         )
         pushed = (rows.noise[:3] > detections.HELD_RATIO * in_hand.noise[:3]).any()
         return in_hand if angle or pushed else _separate_triads(source, in_hand)
-    trembling = trembling_windows(rows, pieces, source.rate)
     if not trembling.any():
         return rows
     shaky = np.isin(np.arange(len(windows)), held[trembling])

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from small_sessions import LADDER, SD, ladder, rows_of
 
+from fieldcal.model.rows import hand_detection
 from fieldcal.model.rows.averages import Rows
-from fieldcal.model.rows.hand_detection import force_wander_angle, tremor_rms
+from fieldcal.model.rows.hand_detection import tremor_rms
 
 EVERY = tuple(range(len(LADDER)))
 
@@ -20,6 +21,11 @@ def held(angle: float, free: tuple[int, ...] = EVERY, rows: int = 12) -> Rows:
     off = angle * np.cross(x.f, rng.standard_normal((len(x), 3)))
     y = np.hstack([x.f + off, x.w]) + SD * rng.standard_normal((len(x), 6))
     return rows_of(x, y)
+
+
+def force_wander_angle(rows: Rows) -> float:
+    """Of rows whose gyroscopes show a hand in no window."""
+    return hand_detection.force_wander_angle(rows, False)
 
 
 @pytest.mark.parametrize("angle", [2e-3, 1e-2])
@@ -45,6 +51,19 @@ def test_what_scatters_along_the_force_as_well_is_no_hand() -> None:
     y = one.y.copy()
     y[:, :3] += 1e-2 * rng.standard_normal((len(y), 3))
     assert force_wander_angle(replace(one, y=y)) == 0.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 2e-3])
+def test_a_hand_in_some_windows_pushes_as_well(angle: float) -> None:
+    """Along the force as well: who holds it in some windows holds it in others."""
+    one = held(angle)
+    y, up = one.y.copy(), one.x.f / np.linalg.norm(one.x.f, axis=1, keepdims=True)
+    push = 1.6e-2 * np.random.default_rng(3).standard_normal(len(y))
+    y[:, :3] += push[:, None] * up
+    rows = replace(one, y=y)
+    assert force_wander_angle(rows) == 0.0, "a table may be shaken like that"
+    found = hand_detection.force_wander_angle(rows, True)
+    assert found == pytest.approx(angle, rel=0.1)
 
 
 def test_a_jump_in_one_window_is_no_hand() -> None:

@@ -148,7 +148,7 @@ def test_a_hand_that_is_calm_most_of_the_time_is_one() -> None:
     angles = np.full((5, 3), 2e-4)
     angles[4] = 2e-2
     assert all(
-        force_wander_angle(reduce_to_rows(recording(angles, seed))) > 0
+        force_wander_angle(reduce_to_rows(recording(angles, seed)), False) > 0
         for seed in range(20)
     )
 

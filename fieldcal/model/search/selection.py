@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -40,8 +41,10 @@ class Search:
         changes = [self._with_one_more, self._with_one_replaced]
         if thorough:
             changes += [
+                self._with_both_parts_replaced,
                 self._with_two_more,
                 self._with_one_for_two,
+                self._with_two_for_one,
                 self._without_function,
                 self._with_wider_cause,
                 self._with_usual_causes,
@@ -104,15 +107,18 @@ class Search:
                 tried.append(self.offers.accept(current, offer))
         return max(tried, key=score_of)
 
-    def _with_two_more(self, current: Set, level: float | None = None) -> Set:
+    def _with_two_more(
+        self, current: Set, level: float | None = None, other_sizes: Sizes | None = None
+    ) -> Set:
         """The best set with two causes more, neither of which suffices alone.
 
         The set itself if none comes near a level, which is its own weight if not given.
+        `other_sizes` are as in `Offers.ranked`.
         """
         level = current.score if level is None else level
         least = level - 2 * thresholds.PREDICTION_SLACK
         best: dict[tuple[str, str], OfferedPair] = {}
-        for table in self.offers.tables(current):
+        for table in self.offers.tables(current, other_sizes):
             if table.instability == current.sizes.instability:
                 continue
             for pair in offered_pairs(self.sets, current, table, least):
@@ -141,6 +147,33 @@ class Search:
             best = max(tried, key=score_of)
         return best
 
+    def _with_both_parts_replaced(self, current: Set) -> Set:
+        """The best set with an effect of both triads replaced by another in both.
+
+        With one triad alone replaced, neither effect has the other triad beside it.
+        """
+        tried = [current]
+        names = Counter(cause.name for cause, _ in current.members if cause.part)
+        for name in (name for name, parts in names.items() if parts > 1):
+            first = self._place(current, name)
+            reduced = self.sets.without(current, first)
+            for offer in _leading(self.offers.ranked(reduced, current.sizes)):
+                other = offer.member[0].name
+                if other == name:
+                    continue
+                mixed = self.offers.accept(reduced, offer)
+                rest = self.sets.without(mixed, self._place(mixed, name))
+                offers = self.offers.ranked(rest, mixed.sizes)
+                same = (o for o in offers if o.member[0].name == other)
+                if found := next(same, None):
+                    tried.append(self.offers.accept(rest, found))
+        return max(tried, key=score_of)
+
+    @staticmethod
+    def _place(current: Set, name: str) -> int:
+        """Index of the first member of a name."""
+        return next(i for i, (c, _) in enumerate(current.members) if c.name == name)
+
     def _with_one_for_two(self, current: Set) -> Set:
         """The best set with one cause replaced, and without what is not needed then.
 
@@ -155,6 +188,17 @@ class Search:
                     other = self.offers.accept(reduced, offer)
                     if other.score > level:
                         tried.append(drop_superfluous(self.sets, other.members))
+        return max(tried, key=score_of)
+
+    def _with_two_for_one(self, current: Set) -> Set:
+        """The best set with two causes instead of one, neither of which suffices alone.
+
+        A cross-coupling may stand for a quadratic term and a slip of the mount.
+        """
+        tried, level = [current], current.score - thresholds.ALTERNATIVE_LOG_DISTANCE
+        for i in range(len(current.members)):
+            reduced = self.sets.without(current, i)
+            tried.append(self._with_two_more(reduced, level, current.sizes))
         return max(tried, key=score_of)
 
     def _with_wider_cause(self, current: Set) -> Set:

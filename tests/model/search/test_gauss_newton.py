@@ -463,10 +463,12 @@ def test_only_pairs_that_cannot_reach_a_score_are_left_out(seed: int) -> None:
 class Watched(Search):
     """A search that notes beside which sets pairs were tried."""
 
-    def _with_two_more(self, there: Set, level: float | None = None) -> Set:
+    def _with_two_more(
+        self, there: Set, level: float | None = None, other_sizes: Sizes | None = None
+    ) -> Set:
         """Note the set, and go on as ever."""
         self.__dict__.setdefault("asked", []).append(there)
-        return super()._with_two_more(there, level)
+        return super()._with_two_more(there, level, other_sizes)
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -370,3 +370,48 @@ def test_one_cause_is_tried_in_place_of_two(monkeypatch: pytest.MonkeyPatch) -> 
     assert found.keys == {slip} and found.score == 6.0
     assert not any(drift in keys for keys in asked)  # of no use beside the others
     assert search._with_one_for_two(found) is found
+
+
+DRIFTS = ("bias_drift:acc", "bias_drift:gyr")
+WARMING = ("warm_up:acc", "warm_up:gyr")
+
+
+def drawn_from(session: Session, keys: Sequence[str], seed: int) -> Search:
+    """A search in rows that are drawn from causes of a session."""
+    rng = np.random.default_rng(seed)
+    causes = {c.key: c for c in session.dictionary.causes}
+    off = session.noise(rng)
+    for key in keys:
+        group = causes[key].variants[-1]
+        typical = 3.0 * group.prior_sigma(1.0)
+        off += session.design[:, :, group.columns] @ (
+            typical * np.sign(rng.standard_normal(len(group.columns)))
+        )
+    return session.search(off)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_effect_of_both_triads_is_replaced_in_both(seed: int) -> None:
+    """Beside a drift of one triad, the warm-up of the other has no companion."""
+    session = Session.of(ladder(), (*DRIFTS, *WARMING))
+    search = drawn_from(session, WARMING, seed)
+    causes = {c.key: c for c in session.dictionary.causes}
+    whole = tuple((causes[key], causes[key].variants[-1]) for key in DRIFTS)
+    current = search.sets.evaluate(whole)
+    found = search._with_both_parts_replaced(current)
+    assert found.keys == {*WARMING} and found.score > current.score
+    assert search._with_both_parts_replaced(found).score == found.score
+    alone = search.sets.evaluate(whole[:1])
+    assert search._with_both_parts_replaced(alone) is alone
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_causes_are_tried_in_place_of_one(seed: int) -> None:
+    """Neither of them explains the rows as well as the one in their place."""
+    true = ("cross_coupling", "g_sensitivity")
+    search = drawn_from(SESSION, true, seed)
+    current = search.sets.evaluate((there("angle_offset"),))
+    found = search._with_two_for_one(current)
+    assert found.keys == {*true} and found.score > current.score
+    visited = [s.keys for s in search.sets.visited.values()]
+    assert frozenset(true) in visited

@@ -1,14 +1,19 @@
 """What is left of a smoothing whose time constant is not known exactly.
 
-The smoothed outputs y of a device follow its outputs x by tau y' = x - y. What was
-calculated from y with a time constant that is too short by e is
+The smoothed outputs y of a device follow its outputs x by tau y' = x - y. What is
+calculated from y with a time constant that is too long by e is
 
-    x - (y + (tau - e) y') = e y'                                                   (1)
+    y + (tau + e) y' = x + e y'                                                     (1)
 
-late by e. In a row of a window this is the change of y from one end to the other, over
-the length of the row: nothing but where y still settles. There y' is that of a device
-at rest, as the noise of y is the noise of the row itself. During a turn the gyroscopes
-lack e y' all the way. Source: model of this project.
+In a row of a window this is the change of y from one end to the other, over the length
+of the row: nothing but where y still settles. During a turn the outputs have e y' more
+all the way, with
+
+    tau y'' = x' - y'                                                               (2)
+
+Both are those of a device without noise, which rests in its windows, and moves as its
+gyroscopes say: the noise of y' is that of the rows, and would be taken for e. Source:
+model of this project.
 """
 
 from __future__ import annotations
@@ -64,9 +69,10 @@ class UndoneSmoothing:
         y = self._smoothed()
 
         def columns(view: RowView) -> Array:
-            """Slope of y in each row, (1), by the sensors of each part: (n, 6, k)."""
+            """Y' in each row, by the sensors of each part: (n, 6, k)."""
+            at_rest = view.x.position >= 0
+            slope = y.slope(view.x) if at_rest.any() else self._on_the_way(view, y)
             out = np.zeros((len(view.x), 6, len(parts)))
-            slope = y.slope(view.x.t, _lengths(view.x))
             for k, triads in enumerate(parts):
                 for triad in triads:
                     out[:, triad, k] = slope[:, triad]
@@ -75,6 +81,18 @@ class UndoneSmoothing:
         at = table.add(General(SMOOTHING, columns, needs_whole_turn=True), len(parts))
         yield Group("device", SMOOTHING, at, self.sigma[smoothed[: len(parts)]],
                     fixed_size=1.0)  # fmt: skip
+
+    def _on_the_way(self, view: RowView, y: SmoothedOutputs) -> Array:
+        """Y' at the edges of a turn, (2), from what it was where the device rested."""
+        tau = np.repeat(np.where(self.seconds > 0, self.seconds, np.inf), 3)
+        x = np.hstack([view.x.f, view.x.w]) * view.state.scale
+        out = np.zeros_like(x)
+        out[0] = y.slope_at(view.x.t[0])
+        for k, step in enumerate(np.diff(view.x.t).tolist()):
+            left = np.exp(-step / tau)
+            # x' is even from edge to edge
+            out[k + 1] = left * out[k] + (1 - left) * (x[k + 1] - x[k]) / step
+        return out
 
     def _smoothed(self) -> SmoothedOutputs:
         """The outputs y, without noise in windows."""
@@ -96,12 +114,6 @@ class UndoneSmoothing:
         return SmoothedOutputs(t, six)
 
 
-def _lengths(x: Experience) -> Array:
-    """What each row is a mean over, or how far apart edges of a turn are, s: (n,)."""
-    apart = np.gradient(x.t) if len(x) > 1 else np.ones(len(x))
-    return np.where(x.lasts > 0, x.lasts, apart)
-
-
 def _last_known(six: Array) -> Array:
     """Outputs (n, 6) of which a missing one keeps the value of the previous sample."""
     at = np.where(np.isfinite(six), np.arange(len(six))[:, None], 0)
@@ -117,11 +129,18 @@ class SmoothedOutputs:
     t: Array
     y: Array
 
-    def slope(self, t: Array, lasts: Array) -> Array:
-        """Mean of y' over `lasts` (m,) about the instants t (m,), s: (m, 6)."""
-        change = [
-            np.interp(t + lasts / 2, self.t, y) - np.interp(t - lasts / 2, self.t, y)
-            for y in self.y.T
-        ]
-        out: Array = np.stack(change, axis=1) / lasts[:, None]
+    def slope(self, x: Experience) -> Array:
+        """Mean of y' over rows, (n, 6)."""
+        half = x.lasts / 2
+        change = self._at(x.t + half) - self._at(x.t - half)
+        out: Array = change / np.where(x.lasts > 0, x.lasts, 1.0)[:, None]
         return out
+
+    def slope_at(self, t: float) -> Array:
+        """Y' just before an instant, (6,)."""
+        k = max(int(np.searchsorted(self.t, t)), 1)
+        out: Array = (self.y[k] - self.y[k - 1]) / (self.t[k] - self.t[k - 1])
+        return out
+
+    def _at(self, t: Array) -> Array:
+        return np.stack([np.interp(t, self.t, y) for y in self.y.T], axis=1)

@@ -71,7 +71,9 @@ class Quantisation(Chain):
 
     def _matters(self, recording: CheckedSamples, c: int, lsb: float) -> bool:
         finest = recording.grids.steps[:, c].min()
-        own = rounding.noise_before_rounding(recording.noise[c], finest)
+        # beside a hand, samples differ from the next by what the sensor is alone
+        shown = min(recording.noise[c], recording.quick[c])
+        own = rounding.noise_before_rounding(shown, finest)
         return bool(lsb > 2 * MATTERS * own)
 
 

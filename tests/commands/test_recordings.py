@@ -83,6 +83,25 @@ def test_five_mpu9150_leave_no_more_than_the_peer_s_model(
     assert solved["quadratic_sigma"] == 2e-5  # the stops show it: not 2.5e-4
 
 
+@pytest.mark.parametrize("i", UNITS)
+@pytest.mark.thorough
+def test_five_mpu9150_are_explained(
+    units: Callable[[int], Unit], i: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Hands turn them in all rests, and shake them in some; no function of time."""
+    folder = units(i).folder
+    capsys.readouterr()
+    assert main(["diagnose", str(folder), "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said["verdict"] in ("left_out", "ambiguous")
+    found = {effect["id"]: effect for effect in said["effects"]}
+    assert {"cross_coupling", "quantisation"} <= set(found)
+    assert (
+        said["fit"]["after"]["held_out_rms"]
+        < 0.9 * (said["fit"]["before"]["held_out_rms"])
+    )
+
+
 def stops_without_weights(folder: Path) -> np.ndarray:
     """Mean specific force of each stop, (n, 3), as anybody would take it."""
     session = Session.open(folder)

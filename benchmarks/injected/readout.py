@@ -47,15 +47,33 @@ def grid(values: Array) -> float:
     return step if float(off.max()) < 0.1 else 0.0
 
 
+def on_grid(before: Array, more: Array, step: float) -> Array:
+    """Values so many whole steps further, each written as the text writes it.
+
+    >>> on_grid(np.array([0.33, 0.67, 1.0]), np.array([1.0, 0.0, 1.0]), 1 / 3)
+    array([0.67, 0.67, 1.33])
+    """
+    known = np.isfinite(before)
+    levels = np.unique(before[known])
+    at = np.round((levels - levels[0]) / step)
+    count = np.round((before - levels[0]) / step) + more
+    wanted = np.unique(count[known])
+    written = in_decimals(levels[0] + wanted * step, levels)
+    there = np.isin(wanted, at)
+    written[there] = levels[np.searchsorted(at, wanted[there])]
+    out = np.full(len(before), np.nan)
+    out[known] = written[np.searchsorted(wanted, count[known])]
+    return out
+
+
 def in_decimals(changed: Array, before: Array) -> Array:
     """Values in as many decimals as a text had before; as they are if it had none.
 
     >>> in_decimals(np.array([0.30213]), np.array([0.3, 0.32]))
     array([0.3])
     """
-    known = before[np.isfinite(before)]
     for d in DECIMALS:
-        if np.allclose(known, np.round(known, d), rtol=1e-9, atol=1e-13):
+        if np.allclose(before, np.round(before, d), rtol=1e-9, atol=1e-13):
             return np.round(changed, d)
     return changed
 
@@ -79,8 +97,8 @@ def put_out(six: Array, change: Array, rng: np.random.Generator) -> Array:
         step = grid(six[:, c])
         if step > 0:
             unknown = rng.uniform(-0.5, 0.5, len(six))
-            whole = six[:, c] + step * np.round(change[:, c] / step + unknown)
-            out[:, c] = in_decimals(whole, six[:, c])
+            more = np.round(change[:, c] / step + unknown)
+            out[:, c] = on_grid(six[:, c], more, step)
         low, high = rails(six[:, c])
         there: NDArray[np.bool_] = (six[:, c] <= low) | (six[:, c] >= high)
         out[:, c] = np.where(there, six[:, c], np.clip(out[:, c], low, high))

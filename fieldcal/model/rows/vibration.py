@@ -83,9 +83,9 @@ def _compare_windows(
         out[i] = np.concatenate(
             [short_lag_noise(t[a:b]) for t in (block.acc, block.gyr)]
         )
-    grain = rounding_noise(
-        block, windows
-    )  # outputs may stay on one step all through some
+    seen = np.isfinite(out).any(axis=0)
+    grain = rounding_noise(block, windows)
+    # outputs may stay on one step all through some
     stands = _never_changes(out, grain)
     out[stands] = np.nan
     finest = grain.min(axis=0)
@@ -106,7 +106,8 @@ def _compare_windows(
     quiet = fine if fine.any() else quiet
     noise = noise_of(block, windows[quiet], rate_hz)
     white, quick = (
-        np.where(finest > 0, np.fmax(n, finest), n) for n in (noise.white, noise.quick)
+        np.where(seen & (finest > 0), np.fmax(n, finest), n)
+        for n in (noise.white, noise.quick)
     )
     # of samples that were computed; of a value that is repeated nothing is known
     least = converter_noise(block)

@@ -160,3 +160,15 @@ def test_the_usual_noise_is_that_of_the_quieter_quarter() -> None:
     six[N:, :3] += 0.02 * np.random.default_rng(8).standard_normal((3 * N, 3))
     found = quiet_window_noise(block_of(six), WINDOWS[:4], RATE)
     np.testing.assert_allclose(found.white, WHITE, rtol=0.15)
+
+
+def test_of_an_output_without_samples_no_noise_is_known() -> None:
+    """Not even that of rounding, though all of its samples lie on a grid."""
+    six = six_of()
+    step = 0.3 * WHITE
+    six = np.round(six / step) * step
+    six[:, 4] = np.nan
+    found = quiet_window_noise(block_of(six), WINDOWS, RATE)
+    assert np.isnan(found.white[4]) and np.isnan(found.quick[4])
+    others = [0, 1, 2, 3, 5]
+    np.testing.assert_allclose(found.white[others], WHITE[others], rtol=0.1)

@@ -17,7 +17,7 @@ Rows = NDArray[np.intp]
 GRID_SAMPLES = 20_000
 """Samples that show the grid that values lie on."""
 
-MAX_GRID_PARTS, MIN_GRID_GAPS = 12, 9
+MAX_GRID_PARTS, MIN_GRID_GAPS = 40, 9
 """Steps in the least gap, up to which they are sought, and gaps that say so for
 certain: what a device counts and a program writes in decimals has no two neighbours.
 Any gap is within 5 % of a whole number by chance once in ten times."""

@@ -14,11 +14,11 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
-WIDER = 1.9
-"""Least distance of neighbouring values, in u, that is a matter of another grid."""
-
 TRIED_AT_ONCE, MOST_TRIED, PROBES = 1 << 14, 1 << 20, 24
 """Steps that are tried together, and at all; and values by which they are."""
+
+LONGEST_RUN = 32
+"""Values in a row that bound the step from above: m of them to u / m."""
 
 CHANCE = 1e-9
 """Probability of the values below which a step is no matter of chance."""
@@ -45,19 +45,21 @@ def grid_below_digits(shown: Array, digits: float) -> float:
     largest = float(np.abs(shown).max(initial=0.0))
     if not digits or len(shown) < 2 or not largest:
         return 0.0
-    apart = float(np.diff(shown).min())
-    if apart < WIDER * digits:
-        return 0.0
-    # the distance of two of them is off by the rounding of both
-    low, high = max(apart - digits, WIDER * digits / 2), apart + digits
+    runs = range(1, min(LONGEST_RUN, len(shown)))
+    apart = [float((shown[m:] - shown[:-m]).min()) for m in runs]
+    # so far apart are m + 1 values in a row, but for the rounding of both ends
+    high = min((a + 2 * ROUNDED * digits) / m for m, a in zip(runs, apart, strict=True))
+    low = max(apart[0] - digits, digits)
     change = digits * low / (4 * largest)
-    many = int(np.ceil((high - low) / change))
-    chance = len(shown) * np.log(1.5 * digits / low) + np.log(many)
-    if many > MOST_TRIED or chance > np.log(CHANCE):
+    many = max(int(np.ceil((high - low) / change)), 0)
+    if many > MOST_TRIED:
         return 0.0
     few = shown[np.unique(np.linspace(0, len(shown) - 1, PROBES).astype(np.intp))]
+    # of steps that explain all values, the widest does so least by chance
     for first in range(0, many, TRIED_AT_ONCE):
-        tried = low + change * np.arange(first, min(first + TRIED_AT_ONCE, many))
+        tried = high - change * np.arange(first, min(first + TRIED_AT_ONCE, many))
+        chance = len(shown) * np.log(1.5 * digits / tried) + np.log(many)
+        tried = tried[chance < np.log(CHANCE)]
         place = few / tried[:, None]
         off = np.abs(place - np.round(place)).max(axis=1) * tried
         for step in tried[off < 0.8 * digits]:

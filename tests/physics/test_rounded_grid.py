@@ -54,3 +54,31 @@ def test_a_step_is_found_among_few_values_and_many(digits: float, many: int) -> 
     counts = np.round(np.random.default_rng(many).normal(0, 1500, many))
     shown = np.unique(np.round(STEP * counts / digits) * digits)
     assert abs(grid_below_digits(shown, digits) / STEP - 1) < 1e-5
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("noise", [0.3, 1.5])
+def test_the_step_of_a_device_is_found_however_few_digits_are_finer(
+    seed: int, noise: float
+) -> None:
+    """From 1.6 to 40 digits in a step, never a multiple of it or a part."""
+    rng = np.random.default_rng(100 + seed)
+    digits, many = 1e-3, np.exp(rng.uniform(np.log(1.6), np.log(40.0)))
+    step = digits * many
+    up = rng.uniform(-10.0, 10.0, (7, 3))
+    share = np.concatenate([np.zeros(300), (1 - np.cos(np.linspace(0, np.pi, 80))) / 2])
+    held = np.concatenate(
+        [a + share[:, None] * (b - a) for a, b in zip(up, up[1:], strict=False)]
+    )
+    counts = np.round((held + rng.normal(0, noise * step, held.shape)) / step)
+    log = np.round(step * counts, 3)
+    grids = grids_by_stretch(Block.of(np.arange(len(log)) / 100, log))
+    assert not grids.changed.any()
+    np.testing.assert_allclose(grids.steps[0, :3], step, rtol=2e-3)
+
+
+def test_of_steps_that_explain_all_values_the_widest_is_taken() -> None:
+    """3.958 digits wide, and half of 4.043 as well, as both are odd as often."""
+    counts = np.random.default_rng(1).integers(-2400, 2400, 700)
+    shown = np.unique(np.round(3.958e-3 * counts, 3))
+    assert abs(grid_below_digits(shown, 1e-3) / 3.958e-3 - 1) < 1e-4

@@ -16,6 +16,7 @@ from fieldcal.diagnosis.findings.agreement import UNITS, ModelResiduals
 from fieldcal.diagnosis.findings.calibrated import (
     calibration_groups,
     calibration_of_set,
+    exhausted_search,
     impossible_turn_scales,
 )
 from fieldcal.diagnosis.findings.candidates import tried_candidates
@@ -191,12 +192,8 @@ def _impossible_facts(explanation: Explanation) -> list[str]:
         Nominal(**{k: tuple(v.tolist()) for k, v in nominal.items()}),
     )
     values += impossible_turn_scales(explanation).values()
-    if explanation.inferred.exhausted:
-        values.append(
-            f"{thresholds.MAX_CAUSES} causes together do not explain it: in its"
-            " windows the device was turned, or its columns are not what session.toml"
-            " says"
-        )
+    if sentence := exhausted_search(explanation):
+        values.append(sentence)
     return values + misdirected_turns(_unexplained_turns(explanation))
 
 

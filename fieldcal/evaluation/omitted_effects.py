@@ -23,6 +23,7 @@ from fieldcal.calibration.names import TILTS
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import (
     calibration_of_set,
+    exhausted_search,
     impossible_turn_scales,
 )
 from fieldcal.diagnosis.findings.unknown_mismatch import (
@@ -179,12 +180,13 @@ def with_description_faults(
     return replace(calibration, warnings=warnings, info=info, good=False)
 
 
-def with_impossible_scales(
+def with_impossible_explanation(
     explanation: Explanation, calibration: Calibration
 ) -> Calibration:
-    """The calibration, marked as bad if what explains it has an impossible value.
+    """The calibration, marked as bad if what explains it best cannot have happened.
 
-    Scale factors that it states itself are judged by their own values.
+    Either nothing explains it, or a scale factor has an impossible value. Those that it
+    states itself are judged by their own values.
     """
     own = {*calibration.names}
     sentences = [
@@ -194,6 +196,8 @@ def with_impossible_scales(
         for name, sentence in impossible_turn_scales(explanation).items()
         if name not in own
     ]
+    if unexplained := exhausted_search(explanation):
+        sentences.append(f"the recording shows so much that {unexplained}")
     if not sentences:
         return calibration
     warnings = (*sentences, *calibration.warnings)

@@ -23,7 +23,7 @@ from fieldcal.evaluation.observations import angle_setting, with_provenance
 from fieldcal.evaluation.omitted_effects import (
     omitted_effects,
     with_description_faults,
-    with_impossible_scales,
+    with_impossible_explanation,
     with_omitted_effects,
 )
 from fieldcal.evaluation.prepared_session import PreparedSession
@@ -103,7 +103,7 @@ def solve_prepared(
     calibration = with_omitted_effects(
         with_jump(calibration, shown), omitted_effects(shown, calibration)
     )
-    calibration = with_impossible_scales(shown, calibration)
+    calibration = with_impossible_explanation(shown, calibration)
     return with_description_faults(shown.prepared, calibration)
 
 

@@ -6,14 +6,17 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
+import numpy as np
 import pytest
 from session_folders import places, recorded, write_session
 
+from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.effects import catalogue
+from fieldcal.evaluation.omitted_effects import with_impossible_explanation
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search.selection import is_exhausted
@@ -46,6 +49,12 @@ def test_windows_full_of_turns_are_no_sum_of_effects(
     assert (diagnosis.verdict == "unexplained") == bool(late)
     told = f"{thresholds.MAX_CAUSES} causes together do not explain it"
     assert (told in " ".join(diagnosis.warnings)) == bool(late)
+    calibration = Calibration(
+        "joint", ("acc_bias.x",), np.zeros(1), np.eye(1), ("m/s^2",), 1.0, 1, 0.0
+    )
+    judged = with_impossible_explanation(explanation, calibration)
+    assert judged.good == (not late), "and so it is NO-GO"
+    assert (told in " ".join(judged.warnings)) == bool(late)
     # faults of samples were found before the search
     faults = explanation.prepared.checked.ids
     assert {e.id for e in diagnosis.effects} <= {*faults, "earth_rate"}

@@ -16,7 +16,7 @@ from fieldcal.diagnosis.findings.calibrated import (
     impossible_turn_scales,
     turn_scale_factors,
 )
-from fieldcal.evaluation.omitted_effects import with_impossible_scales
+from fieldcal.evaluation.omitted_effects import with_impossible_explanation
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
@@ -95,7 +95,7 @@ def test_what_no_sensor_has_is_no_explanation(
         "joint", ("acc_bias.x",), np.zeros(1), np.eye(1), ("m/s^2",), 1.0, 1, 0.0,
         ("before",),
     )  # fmt: skip
-    judged = with_impossible_scales(explanation, calibration)
+    judged = with_impossible_explanation(explanation, calibration)
     assert judged.good == (not impossible)
     assert judged.warnings[-1] == "before"
     assert len(judged.warnings) == 1 + len(impossible)

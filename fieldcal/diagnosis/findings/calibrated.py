@@ -82,6 +82,16 @@ def impossible_turn_scales(explanation: Explanation) -> dict[str, str]:
     }
 
 
+def exhausted_search(explanation: Explanation) -> str | None:
+    """What it means that the rows took so many causes that none counts, if they did."""
+    if not explanation.inferred.exhausted:
+        return None
+    return (
+        f"{thresholds.MAX_CAUSES} causes together do not explain it: in its windows the"
+        " device was turned, or its columns are not what session.toml says"
+    )
+
+
 def turn_scale_factors(fitted: Set, nominal: State) -> dict[str, tuple[float, float]]:
     """Scale factors of the gyroscopes by the turns in a set, and sigma, by full name.
 

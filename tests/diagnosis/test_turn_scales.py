@@ -52,7 +52,9 @@ def explained(change: Array, nominal: float = 1.0) -> Explanation:
     )  # fmt: skip
     parts: dict[str, Any] = {
         "best": SimpleNamespace(set=fitted),
-        "inferred": SimpleNamespace(fit=SimpleNamespace(nominal=state)),
+        "inferred": SimpleNamespace(
+            fit=SimpleNamespace(nominal=state), exhausted=False
+        ),
         "source": SimpleNamespace(about=about),
     }
     return cast(Explanation, SimpleNamespace(**parts))

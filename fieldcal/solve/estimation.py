@@ -182,11 +182,16 @@ class ParameterEstimate:
 
     @property
     def valid_at_s(self) -> float | None:
-        """Time for which changing biases are stated, s since the start; or None."""
-        shown = end_values(self.parameter_set, self.parameter_set.explanations)
-        if not shown.bias_scale.any():
+        """Time for which biases are stated, s since the start, if they may change."""
+        d = self.parameter_set
+        changing = sum(
+            one.probability
+            for one in d.explanations
+            if end_values(d, [one]).bias_scale.any()
+        )
+        if changing < thresholds.MENTIONED:
             return None
-        x = self.parameter_set.x
+        x = d.x
         return float((x.since_start + x.lasts / 2).max())
 
     @property

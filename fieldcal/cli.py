@@ -107,10 +107,28 @@ def _run_named_command(argv: Sequence[str] | None) -> int:
     """Run the command whose name is the first argument."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] not in COMMANDS:
+        if arguments and not arguments[0].startswith("-"):
+            return _refuse_command(arguments[0])
         from fieldcal.core.version import __version__
 
         _top_parser(__version__).parse_args(arguments or ["--help"])
     return _run_guarded(arguments[0], arguments[1:])
+
+
+def _refuse_command(name: str) -> int:
+    """Say that there is no such command, and which one may be meant."""
+    from difflib import get_close_matches
+
+    from fieldcal.core.errors import FieldcalError
+    from fieldcal.core.escaping import escape_line
+
+    near = get_close_matches(name, COMMANDS, 1)
+    meant = f"did you mean {near[0]}? " if near else ""
+    sys.stderr.write(
+        f"fieldcal: there is no command {escape_line(repr(name))}: {meant}see fieldcal"
+        " --help\n"
+    )
+    return FieldcalError.exit_code
 
 
 def _run_guarded(name: str, arguments: list[str]) -> int:

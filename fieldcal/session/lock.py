@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
+from datetime import datetime
 from getpass import getuser
 from pathlib import Path
 from platform import node
@@ -95,8 +96,8 @@ def _holder(owner: Path) -> str:
     """Holder of a lock, as far as it is known."""
     try:
         held = json.loads(owner.read_text("utf-8"))
-        minutes = max(0.0, time() - float(held["host_s"])) / 60
+        since = datetime.fromtimestamp(float(held["host_s"])).astimezone()
         who = f"process {held['pid']} of {held['user']} on {held['host']}"
-    except (OSError, ValueError, KeyError, TypeError, ImportError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, ImportError):
         return "another process"
-    return f"{who}, for {minutes:.0f} min,"
+    return f"{who}, since {since:%Y-%m-%d %H:%M},"

@@ -42,7 +42,10 @@ def test_a_second_writer_is_told_who_is_there(
 ) -> None:
     folder = tmp_path / "s"
     before = {p.name: p.read_bytes() for p in folder.iterdir()}
-    with pytest.raises(SessionError, match=f"process {other.pid} of .*, for 0 min,"):
+    with pytest.raises(
+        SessionError,
+        match=rf"process {other.pid} of .*, since \d{{4}}-\d\d-\d\d \d\d:\d\d,",
+    ):
         Recorder(folder, None)
     with pytest.raises(SessionError, match="records into it: end that run first"):
         Recorder(folder, {"format": 1})

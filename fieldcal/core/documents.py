@@ -11,12 +11,16 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from datetime import date, time
 from typing import Any
 
 BYTE_ORDER_MARK = "\ufeff"
+LONGEST_LINE = 60
+"""Characters of a faulty line that are told."""
+
 NESTED_TOO_DEEPLY = "it is nested too deeply"
 NUMBER_TOO_LONG = "it has a number of thousands of digits"
 
@@ -38,12 +42,27 @@ def load_toml(text: str) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
-    except tomllib.TOMLDecodeError:
-        raise
+    except tomllib.TOMLDecodeError as error:
+        raise tomllib.TOMLDecodeError(f"{error}{_line_of(text, str(error))}") from None
     except RecursionError:
         raise tomllib.TOMLDecodeError(NESTED_TOO_DEEPLY) from None
     except ValueError:
         raise tomllib.TOMLDecodeError(NUMBER_TOO_LONG) from None
+
+
+def _line_of(text: str, error: str) -> str:
+    """The line that a parser's error names, and what is usually wrong with it."""
+    place = re.search(r"at line (\d+), column (\d+)", error)
+    if place is None:
+        return ""
+    row, column = int(place[1]) - 1, int(place[2]) - 1
+    # the parser splits at line feeds only
+    line = text.removeprefix(BYTE_ORDER_MARK).split("\n")[row].strip("\r")
+    comma = re.fullmatch(r"[^\"'\[{]*=\s*[-+]?\d+", line[:column]) and (
+        line[column : column + 1] == ","
+    )
+    remedy = ": write a decimal point" if comma else ""
+    return f", in {line.strip()[:LONGEST_LINE]!r}{remedy}"
 
 
 def load_json(text: str) -> Any:

@@ -61,6 +61,20 @@ def test_toml_that_cannot_be_parsed(text: str, why: str) -> None:
         load_toml(text)
 
 
+@pytest.mark.parametrize("mark", ["", BYTE_ORDER_MARK])
+def test_a_faulty_line_is_shown_with_what_is_wrong_with_it(mark: str) -> None:
+    with pytest.raises(tomllib.TOMLDecodeError) as error:
+        load_toml(f"{mark}a = 1\r\n  height_m = -170,5\r\n")
+    assert str(error.value).endswith("in 'height_m = -170,5': write a decimal point")
+    for other in ("a = 1\nb = [1 2]", "a = 1\nb = 1 2", 'a = 1\nb = "c", "d"'):
+        with pytest.raises(tomllib.TOMLDecodeError) as error:
+            load_toml(mark + other)
+        assert str(error.value).endswith(f", in {other[6:]!r}")
+    with pytest.raises(tomllib.TOMLDecodeError) as error:
+        load_toml(mark + "x" * 999)
+    assert len(str(error.value)) < 200
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [

@@ -2,7 +2,7 @@
 
 `schemas/session.schema.json` states the type and range of each key: another value is an
 error that names file, key and remedy. Unknown keys are ignored, so that other programs
-may add their own.
+may add their own; `Session.open` warns of one that is nearly a known key.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -59,8 +60,7 @@ def read_description(path: Path) -> Description:
         ) from error
     except NotADirectoryError as error:
         raise SessionError(
-            f"{path.parent}: is a file, no session; make a session of it with"
-            f" fieldcal import {path.parent}"
+            f"{path.parent}: {_no_session(path.parent, path.name)}"
         ) from error
     except (OSError, UnicodeDecodeError) as error:
         raise SessionError(f"{path}: cannot be read: {error}") from error
@@ -70,6 +70,21 @@ def read_description(path: Path) -> Description:
         return parse_description(raw)
     except InputError as error:
         raise SessionError(f"{path}: {error}") from error
+
+
+def _no_session(file: Path, description: str) -> str:
+    """Why a file is no session, and what to name or do instead."""
+    if (file.parent / description).is_file():
+        return f"is a file of a session; name the session's folder, {file.parent}"
+    if file.suffix == ".toml":
+        return (
+            "is a file, no session; name a session's folder, or record one by this"
+            f" plan with fieldcal run {quote(str(file))}"
+        )
+    return (
+        "is a file, no session; make a session of it with fieldcal import"
+        f" {quote(str(file))}"
+    )
 
 
 def parse_description(raw: Mapping[str, Any]) -> Description:

@@ -47,6 +47,7 @@ from fieldcal.session.marks import (
     read_marks,
 )
 from fieldcal.session.position_tables import parse_positions
+from fieldcal.session.schemas import load_schema, misspelt_keys
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 DESCRIPTION = "session.toml"
@@ -86,6 +87,7 @@ class Session:
         says: list[str] = []
         marks = list(read_marks(folder / MARKS, says))
         says += _guess_warnings(about.raw)
+        says += _misspelt_warnings(about.raw)
         about = _with_windows(_with_added_positions(about, marks), marks)
         about = replace(about, nominal_as_sent=nominal_as_sent(about.nominal, marks))
         return cls(folder, about, tuple(says))
@@ -235,6 +237,16 @@ class Session:
         return write_atomically(
             self.folder / name, json.dumps(content, indent=2, allow_nan=False) + "\n"
         )
+
+
+def _misspelt_warnings(raw: Mapping[str, Any]) -> list[str]:
+    """Warnings about keys that are nearly known ones: what they state is not used."""
+    # a plan's table [run] and its keys are no part of a session, and known as well
+    known: dict[str, Any] = {name: {} for name in load_schema("plan")["properties"]}
+    return [
+        f"{DESCRIPTION}: {fault}; as it is, it is not used"
+        for fault in misspelt_keys(raw, {"properties": known}, load_schema("session"))
+    ]
 
 
 def _guess_warnings(raw: Mapping[str, Any]) -> list[str]:

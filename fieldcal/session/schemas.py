@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
+from operator import ne
 from typing import Any
 
 
@@ -113,9 +114,15 @@ def _misspelt(
     for key in table:
         near = [name for name in known if name.startswith(f"{key}_")]  # lacks its unit
         near += get_close_matches(key, known, 1, NEARLY)
+        near += [name for name in known if _is_one_letter_off(key, name)]
         if near and key not in known:
             found.append(f"{_key([*path, key])} is not known: write {near[0]}")
     return found
+
+
+def _is_one_letter_off(key: str, name: str) -> bool:
+    """Whether one letter is another, which of a short name is a large part."""
+    return len(key) == len(name) and sum(map(ne, key, name)) == 1
 
 
 def _misplaced(tables: Mapping[str, Any], known: Mapping[str, Any]) -> list[str]:
@@ -176,8 +183,8 @@ def _key(path: list[str | int]) -> str:
     """Key as a reader finds it in the file."""
     if len(path) < 2:
         return ".".join(map(str, path)) or "the file"
-    if path[0] == "position":
-        number = int(path[1]) + 1
+    if path[0] == "position" and isinstance(path[1], int):
+        number = path[1] + 1
         return " ".join([f"[[position]] number {number}", *map(str, path[2:])])
     depth = 2 if path[:2] == ["run", "mover"] and len(path) > 2 else 1
     table = ".".join(map(str, path[:depth]))

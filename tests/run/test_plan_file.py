@@ -157,6 +157,8 @@ def test_what_is_too_much_to_read_is_counted() -> None:
     ("tables", "says"),
     [
         ({"positions": POSITIONS}, "positions is not known: write position"),
+        ({"position": {"alpha": 1.0}}, "[position] alpha is not known: write alpha_"),
+        ({"rum": {"seconds": 9.0}}, "rum is not known: write run"),
         (
             {"site": {"latitude": 50.0}},
             "[site] latitude is not known: write latitude_d",

@@ -395,3 +395,21 @@ def test_samples_keep_no_file_in_memory(tmp_path: Path) -> None:
         assert column.flags.c_contiguous
         assert (column if column.base is None else column.base).flags.owndata
     np.testing.assert_array_equal(read.seq, block.seq)
+
+
+def test_a_misspelt_key_of_a_session_is_told(tmp_path: Path) -> None:
+    """What it states is not used, which nobody would notice."""
+    toml = """
+        notes = "mine"
+        [site]
+        latitude = 50.45
+        town = "Kyiv"
+        [run]
+        procedure = "five_position"
+        seconds = 30.0
+        """
+    (said,) = Session.open(folder(tmp_path / "s", toml)).warnings
+    assert "[site] latitude is not known: write latitude_deg" in said
+    assert not Session.open(
+        folder(tmp_path / "t", toml.replace("latitude", "latitude_deg"))
+    ).warnings

@@ -125,6 +125,11 @@ def read_calibration(path: Path) -> Calibration:
     try:
         document = load_json(file.read_text("utf-8"))
     except FileNotFoundError:
+        if file == path:
+            raise InputError(
+                f"{path}: is not there; name the folder of a session that was solved,"
+                " or its result.json"
+            ) from None
         raise InputError(f"{file} is not there: run fieldcal solve first") from None
     except (OSError, ValueError) as fault:
         raise InputError(

@@ -70,7 +70,7 @@ def import_imu(
     with show_work(args, reading):
         imported = import_stream(recording, stream.name, folder, about, args.still)
     sys.stderr.write(
-        f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"
+        f"{folder}: {stream.sentence()}: {imported.facts.sentence()},"
         f" {_counted_rests(imported.rests, args.still)}\n"
     )
     _tell_taken(folder, guessed, imported)

@@ -73,10 +73,21 @@ def plan_tables(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _described(path: Path) -> Description:
-    """What a session, or a file, says of device, site and positions."""
+    """What a session, or a file, says of device, site and positions.
+
+    Raises
+    ------
+    InputError
+        If it is not there, or cannot be used.
+
+    """
     from fieldcal.session.description_file import read_description
     from fieldcal.session.folder import DESCRIPTION
 
+    if not path.exists():
+        raise InputError(
+            f"{path}: is not there; name a session's folder or a plan file"
+        )
     return read_description(path / DESCRIPTION if path.is_dir() else path)
 
 

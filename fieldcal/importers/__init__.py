@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from shlex import quote
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.file_names import refuse_undecodable_path
@@ -20,6 +21,7 @@ from fieldcal.drivers import codec
 from fieldcal.importing.files.packed_stream import first_bytes
 from fieldcal.importing.read_options import ReadOptions
 from fieldcal.importing.recording import Recording
+from fieldcal.session.folder import DESCRIPTION
 
 TRIED_LAST = ("csv_like", "wire")
 """Formats without a mark of their own, tried last, in this order."""
@@ -110,6 +112,11 @@ def _open_folder(path: Path, wanted: ReadOptions, repair: bool) -> Recording:
     if module.is_unpacked(path):
         opened = plugin_class(module.__name__, Recording)  # type: ignore[type-abstract]
         return opened(path, wanted, repair)
+    if (path / DESCRIPTION).is_file():
+        raise InputError(
+            f"{path}: is a session already, nothing is left to import; go on with"
+            f" fieldcal solve {quote(str(path))}"
+        )
     names = [str(path / name) for name in module.member_names(path)[:SHOWN]]
     there = f", such as {' or '.join(names)}" if names else ""
     raise InputError(f"{path}: is a folder; name the recording in it{there}")

@@ -67,6 +67,16 @@ class ImuStream:
     name: str
     says: str
 
+    def sentence(self) -> str:
+        """Name and line; a number that only counts IMUs is no name.
+
+        >>> ImuStream("0", "columns in g").sentence()
+        'columns in g'
+        >>> ImuStream("IMU.0", "calibrated").sentence()
+        'IMU.0, calibrated'
+        """
+        return self.says if self.name == "0" else f"{self.name}, {self.says}"
+
 
 class Recording(ABC):
     """A file, opened.

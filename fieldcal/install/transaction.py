@@ -31,6 +31,10 @@ from fieldcal.session.folder import DESCRIPTION, Session
 SAVED = "installed-before-"
 """What the name of a file with an old set begins with."""
 
+NAME_WHAT_WAS_WRITTEN = (
+    "name the session that was written, or its installed-before file"
+)
+
 
 GYR_OFFSETS = {
     name
@@ -212,6 +216,10 @@ def last_saved(path: Path) -> tuple[Path, dict[str, Any]]:
                         for key in ("old", "new"))  # fmt: skip
             known = {"device": str(document["device"]), "old": old, "new": new,
                      "done": bool(document.get("done"))}  # fmt: skip
+        except FileNotFoundError as error:
+            raise InputError(
+                f"{file}: is not there; {NAME_WHAT_WAS_WRITTEN}"
+            ) from error
         except (OSError, ValueError, KeyError, AttributeError, TypeError) as error:
             raise InputError(
                 f"{file}: is no saved set of parameters: {error}"
@@ -219,6 +227,6 @@ def last_saved(path: Path) -> tuple[Path, dict[str, Any]]:
         if not document.get("undone"):
             return file, known
     raise InputError(
-        f"{path}: nothing was written from there that could be undone; name the session"
-        " that was written, or its installed-before file"
+        f"{path}: nothing was written from there that could be undone;"
+        f" {NAME_WHAT_WAS_WRITTEN}"
     )

@@ -151,7 +151,7 @@ def _read(path: Path) -> Mapping[str, Any] | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
-        raise SessionError(f"{path}: cannot be read: {error}") from error
+        raise SessionError(f"{path}: cannot be read: {error}; make it again") from error
     if not isinstance(content, dict):
         raise SessionError(f"{path}: holds no JSON object; make it again")
     return content

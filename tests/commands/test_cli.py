@@ -69,6 +69,41 @@ def test_wrong_usage_ends_with_2(arguments: Sequence[str]) -> None:
     assert done.returncode == 2 and done.stderr and not done.stdout
 
 
+def test_a_command_that_does_not_exist_is_one_sentence(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["slove", "log"]) == main(["\x1b[2J"]) == 2
+    near, none = capsys.readouterr().err.splitlines()
+    assert near == (
+        "fieldcal: there is no command 'slove': did you mean solve? see fieldcal --help"
+    )
+    assert none.endswith(": see fieldcal --help") and "\x1b" not in none
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["compare", "gone", "gone"], "gone: is not there; name the folder of a ses"),
+        (["temperature", "gone", "also", "lost"], "is not there; name the folder of"),
+        (["undo", "gone"], "gone: is not there; name the session that was written"),
+        (["plan", "--of", "gone"], "gone: is not there; name a session's folder or"),
+        (["import", "gone.csv"], "gone.csv: is not there; check its name"),
+    ],
+)
+def test_what_is_not_there_is_not_to_be_solved_first(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: Sequence[str],
+    says: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert says in said and one_sentence(said) and "Errno" not in said
+    assert not list(tmp_path.iterdir())
+
+
 def test_help_loads_nothing_heavy() -> None:
     code = (
         "import sys\nfrom fieldcal.cli import main\ntry:\n main(['--help'])\n"

@@ -708,3 +708,6 @@ def test_fields_of_structures_are_arrays(tmp_path: Path, ending: str) -> None:
 def test_a_folder_is_no_recording(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is a folder; name the recording in it"):
         open_recording(tmp_path, ReadOptions())
+    (tmp_path / "session.toml").write_text("format = 1\n")
+    with pytest.raises(InputError, match="a session already, .* fieldcal solve "):
+        open_recording(tmp_path, ReadOptions())

@@ -116,6 +116,8 @@ def open_unpacked(path: Path, cut: OnTruncation | None = None) -> IO[bytes]:
         file = path.open("rb")
         magic = file.read(LONGEST_MAGIC)
         file.seek(0)
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: is not there; check its name") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     refuse = refuse_truncated(path)

@@ -253,7 +253,9 @@ def _as_remedy(
     seconds: float,
     left: Sequence[str],
 ) -> Remedy:
-    word = "one position" if len(chosen) == 1 else f"{len(chosen)} positions"
+    one = len(chosen) == 1
+    word = "one position" if one else f"{len(chosen)} positions"
+    time = f"{seconds:.0f} s" if one else f"{seconds:.0f} s each"
     where = " and ".join(p.name for p in chosen)
     why = "nothing checks what the others determine"
     if over:
@@ -262,7 +264,7 @@ def _as_remedy(
         if not np.isfinite(over[worst]):
             now = "not determined yet"
         why = f"{parameter_title(worst)} is {now}"
-    says = f"{word} more for {seconds:.0f} s, {where}: {_expectation(left)} ({why})"
+    says = f"{word} more for {time}, {where}: {_expectation(left)} ({why})"
     angles = tuple(angles for p in chosen if (angles := p.degrees))
     return Remedy(says, positions=angles, seconds=seconds)
 

@@ -299,6 +299,20 @@ def test_go_is_promised_only_as_far_as_nothing_else_fails(
     assert promised == (not others)
 
 
+def test_each_of_several_positions_takes_its_time(tmp_path: Path) -> None:
+    five = [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS]
+    session = about(tmp_path / "s", five)
+    names = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xyz")
+    for times, says in ((1.5, "one position more for 30 s, "), (2.5, "30 s each, ")):
+        sigma = [1e-4] * 5 + [times * LIMITS.acc_scale_sigma]
+        remedy = cheapest_remedy(
+            found_with(names, sigma), session.about, range(5), LIMITS,
+            ["acc_scale"], 1e-4, 30.0,
+        )  # fmt: skip
+        assert remedy is not None and says in remedy.says
+        assert len(remedy.positions) == 1 + (times > 2)
+
+
 def test_two_positions_need_a_third_one_elsewhere_to_be_checked(tmp_path: Path) -> None:
     """A wrong angle of the second shows nowhere, until a place is held besides."""
     loose = replace(LIMITS, acc_bias_sigma=1.0, acc_scale_sigma=1.0, gyr_bias_sigma=1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -121,4 +122,5 @@ def _write_samples(path: Path, block: Block) -> None:
     except OSError as fault:
         raise InputError(f"{path}: cannot be written: {disk_says(fault)}") from fault
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # a disk that is read-only, or gone
+            part.unlink(missing_ok=True)

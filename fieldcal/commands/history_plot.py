@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.core.errors import InputError
+from fieldcal.core.errors import InputError, disk_says
 from fieldcal.history.store import recording_time
 
 if TYPE_CHECKING:
@@ -52,7 +52,9 @@ def plot_trends(
     figure.autofmt_xdate()
     try:
         figure.savefig(path, dpi=120)
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {disk_says(error)}") from error
+    except ValueError as error:
         raise InputError(f"{path}: cannot be written: {error}") from error
     lost = len(times) - len(known)
     return f"; {lost} of unknown time left out" if lost else ""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.help import EXIT_INTERRUPTED
-from fieldcal.core.errors import InputError
+from fieldcal.core.errors import InputError, disk_says
 
 if TYPE_CHECKING:
     from fieldcal.sim_device.line_faults import LineFaults
@@ -199,7 +199,7 @@ def _write_truth(path: Path, concealed: dict[str, Any]) -> None:
     try:
         path.write_text(json.dumps(concealed, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}") from error
+        raise InputError(f"{path}: cannot be written: {disk_says(error)}") from error
 
 
 def _print_line(line: str) -> None:

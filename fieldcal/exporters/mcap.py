@@ -9,6 +9,7 @@ says so by -1 in its covariance, as the message's definition has it.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -104,7 +105,8 @@ def write(source: ExportSource, path: Path) -> list[str]:
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {disk_says(error)}") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # a disk that is read-only, or gone
+            part.unlink(missing_ok=True)
     moved = [f"times begin {shift:g} s later: MCAP has none before 0"] * (shift > 0)
     return [*source.matrix_notices, *moved]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -137,7 +138,8 @@ class SessionBatch:
                 f"{path}: cannot be written: {disk_says(error)}"
             ) from error
         finally:
-            part.unlink(missing_ok=True)
+            with suppress(OSError):  # a disk that is read-only, or gone
+                part.unlink(missing_ok=True)
 
 
 def parquet_schema(names: Sequence[str]) -> pa.Schema:

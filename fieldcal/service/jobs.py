@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from fieldcal.core.errors import InputError, SessionError
+from fieldcal.core.errors import InputError, SessionError, disk_says
 from fieldcal.service.bounds import ServiceBounds
 from fieldcal.session.file_writing import write_atomically
 from fieldcal.session.lock import SessionLock
@@ -74,17 +74,19 @@ def held_folder(root: Path) -> Iterator[None]:
     Raises
     ------
     InputError
-        If another service holds it.
+        If another service holds it, or it cannot be written.
 
     """
-    root.mkdir(parents=True, exist_ok=True)
     try:
+        root.mkdir(parents=True, exist_ok=True)
         lock = SessionLock(root)
     except SessionError as error:
         raise InputError(
             f"{root}: another fieldcal serve keeps its sessions here: end that one"
             " first, or name another --folder"
         ) from error
+    except OSError as error:
+        raise InputError(f"{root}: cannot be written: {disk_says(error)}") from error
     try:
         yield
     finally:

@@ -240,6 +240,8 @@ def test_calibrations_of_unknown_time_are_listed_and_left_out_of_the_plot(
     assert main([*own, "--png", str(picture)]) == 2
     assert "no calibration has a time" in capsys.readouterr().err
     filled(tmp_path / "h.sqlite", 0.2, 0.21)
+    assert main([*own, "--png", str(tmp_path / "gone" / "p.png")]) == 2
+    assert "written: the folder is not there: make it" in capsys.readouterr().err
     assert main([*own, "--png", str(picture)]) == 0
     said = capsys.readouterr()
     assert "1 of unknown time left out" in said.err and picture.exists()

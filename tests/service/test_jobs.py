@@ -119,6 +119,15 @@ def test_a_second_service_on_the_same_folder_deletes_nothing_that_arrives(
         pass
 
 
+def test_a_folder_that_cannot_be_made_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    call = ["serve", "--folder", str(tmp_path / "file" / "srv")]
+    assert main([*call, "--history", str(tmp_path / "h.sqlite")]) == 2
+    assert "srv: cannot be written: a file is in the way" in capsys.readouterr().err
+
+
 def test_an_upload_is_taken_in_although_an_old_job_cannot_be_deleted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -341,7 +341,10 @@ def pty_of_somebody_else() -> Iterator[str]:
         (["--profile", "/nowhere.toml"], "cannot be read"),
         (["--mounting", "+x,+y,-z"], "left-handed"),
         (["--rate", "-5"], "rate_hz = -5 must be above 0"),
-        (["--truth", "/nowhere/truth.json"], "cannot be written"),
+        (
+            ["--truth", "/nowhere/truth.json"],
+            "the folder is not there: make it",
+        ),
         (["--control", "/nowhere/socket"], "no control socket"),
         (["--base-tilt=1,1", "--with", "base_tilt:about_x_deg=1"], "given twice"),
     ],

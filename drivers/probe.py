@@ -102,7 +102,8 @@ def probe_port(
     says = (
         lines or "bytes come, but no format that is known"
         if heard
-        else "nothing comes; is the device powered and sending?"
+        else "nothing comes; is the device powered and sending? A CAN adapter is silent"
+        " until a run opens it (--device can:…)"
     )
     return DetectedDevice(port, "", "", 0, 0.0, says)
 

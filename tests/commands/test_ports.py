@@ -288,7 +288,8 @@ def test_names_that_leave_a_choice_name_no_device(line: str) -> None:
 def test_silence_and_noise_and_no_port(capsys: pytest.CaptureFixture[str]) -> None:
     rng = np.random.default_rng(2)
     with talking(lambda i: b"") as port:
-        assert "nothing comes" in probe_port(port, 0.1).says
+        said = probe_port(port, 0.1).says
+        assert "nothing comes" in said and "a run opens it (--device can:…)" in said
     with talking(lambda i: rng.bytes(30)) as port:
         assert "no format that is known" in probe_port(port, 0.1).says
     assert "no such port" in probe_port("/dev/nowhere", 0.1).says

@@ -64,13 +64,13 @@ def _recalibration_sentence(found: NoiseResult) -> str:
         return f"no bias leaves its limit within 20 years ({sure}), says {whose}"
     by = "".join(
         f" {100 * chance:.0f} % by {_date(found.since, seconds)},"
+        if math.isfinite(seconds)
+        else f" {100 * chance:.0f} % not within 20 years,"
         for chance, seconds in zip(CHANCES, when.seconds, strict=True)
     )
     return f"{first} is beyond its limit with{by} says {whose}"
 
 
 def _date(since: str, seconds: float) -> str:
-    if not math.isfinite(seconds):
-        return "20 years from now or later"
     then = datetime.fromisoformat(since) + timedelta(seconds=seconds)
     return f"{then:%Y-%m-%d %H:%M}" if seconds < 3 * 86400 else f"{then:%Y-%m-%d}"

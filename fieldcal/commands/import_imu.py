@@ -192,7 +192,7 @@ def _import_means(
     never = float("inf")
     imported = import_stream(recording, stream.name, folder, about | tables, never)
     sys.stderr.write(
-        f"{folder}: {stream.name}, {stream.says}:"
+        f"{folder}: {stream.sentence()}:"
         f" {_counted(imported.facts.rows, 'position', 's')}, means only: nothing that"
         " goes on within a position or between two can be found\n"
     )

@@ -110,6 +110,12 @@ SESSIONS = (
         ("device exchanged",),
         "151 sigma: another device with similar biases and 33 times the noise",
     ),
+    Session(
+        75102019,
+        ("calibrates itself",),
+        "5.9 sigma: a search that took too many causes was no reason against it",
+        of_all=True,
+    ),
 )
 
 MOTIONS = (

@@ -32,6 +32,10 @@ COMMANDS = command_modules()
 """Description and module of each command, by name."""
 
 
+OPTIONS = ("-h", "--help", "--version")
+"""Options that need no command."""
+
+
 class CommandModule(Protocol):
     """Interface of a command module in `commands`."""
 
@@ -107,7 +111,7 @@ def _run_named_command(argv: Sequence[str] | None) -> int:
     """Run the command whose name is the first argument."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] not in COMMANDS:
-        if arguments and not arguments[0].startswith("-"):
+        if arguments and arguments[0] not in OPTIONS:
             return _refuse_command(arguments[0])
         from fieldcal.core.version import __version__
 
@@ -116,7 +120,7 @@ def _run_named_command(argv: Sequence[str] | None) -> int:
 
 
 def _refuse_command(name: str) -> int:
-    """Say that there is no such command, and which one may be meant."""
+    """Say that there is no such command or option, and which command may be meant."""
     from difflib import get_close_matches
 
     from fieldcal.core.errors import FieldcalError
@@ -124,8 +128,11 @@ def _refuse_command(name: str) -> int:
 
     near = get_close_matches(name, COMMANDS, 1)
     meant = f"did you mean {near[0]}? " if near else ""
+    kind = "command"
+    if name.startswith("-"):
+        kind, meant = "option", "name the command first, and its options behind it; "
     sys.stderr.write(
-        f"fieldcal: there is no command {escape_line(repr(name))}: {meant}see fieldcal"
+        f"fieldcal: there is no {kind} {escape_line(repr(name))}: {meant}see fieldcal"
         " --help\n"
     )
     return FieldcalError.exit_code

@@ -81,12 +81,15 @@ def run_setup(about: Description, used: list[int]) -> tuple[RunSetup, Array]:
     if not about.positions or not all(p.oriented for p in about.positions):
         raise InputError("session.toml: give each [[position]] the attitude of its run")
     if about.latitude_deg is None:
-        raise InputError("[site] latitude_deg is lacking: a navigator turns with Earth")
+        raise InputError(
+            "session.toml: [site] latitude_deg is lacking: a navigator turns with Earth"
+        )
     table = about.raw.get("navigator", {})
     azimuth = np.deg2rad(float(table.get("azimuth_deg", 0.0)))
     if azimuth and any(len({0, 2} & {u - k for u in used}) == 1 for k in (0, 3)):
         raise InputError(
-            "[navigator] azimuth_deg turns north and East: the solution has one of them"
+            "session.toml: [navigator] azimuth_deg turns north and East: the solution"
+            " has one of them"
         )
     s, c = np.sin(azimuth), np.cos(azimuth)
     base = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])

@@ -141,17 +141,17 @@ def runs_in_windows(
     for number, window in enumerate(windows, 1):
         if window is None:
             raise InputError(
-                f"[[position]] number {number} has no start_s and end_s: say when its"
-                " run began and ended"
+                f"session.toml: [[position]] number {number} has no start_s and"
+                " end_s: say when its run began and ended"
             )
         start, end = window
         # a time that is no number is in no range
         within = solution.t[0] <= start and end <= solution.t[-1]
         if not (within and end - start >= SHORTEST_S):
             raise InputError(
-                f"[[position]] number {number}: a run of {SHORTEST_S:.0f} s or more"
-                f" must lie within {solution.t[0]:g} to {solution.t[-1]:g} s, not"
-                f" {start:g} to {end:g} s"
+                f"session.toml: [[position]] number {number}: a run of"
+                f" {SHORTEST_S:.0f} s or more must lie within {solution.t[0]:g} to"
+                f" {solution.t[-1]:g} s, not {start:g} to {end:g} s"
             )
         out.append(_run_between(solution, start, end))
     return out

@@ -80,6 +80,14 @@ def test_a_command_that_does_not_exist_is_one_sentence(
     assert none.endswith(": see fieldcal --help") and "\x1b" not in none
 
 
+def test_an_option_stands_behind_its_command(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["--json", "solve", "s"]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "no option '--json': name the command first" in said
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -211,17 +211,22 @@ def _celsius_column(column: Array | None, size: float, zero: float) -> Array | N
 
 
 def describe_units(wanted: ReadOptions) -> str:
-    """Names of the units of the wanted columns, for messages."""
+    """Names of the units of the wanted columns, for messages.
+
+    Those that nobody stated are worked out from the samples by an import.
+    """
     known = {c.partition("=")[0] for c in wanted.columns}
     says = []
     for channel, unit, lsb in (
-        ("ax", wanted.acc_unit or "m/s^2", wanted.acc_lsb),
-        ("gx", wanted.gyr_unit or "rad/s", wanted.gyr_lsb),
+        ("ax", wanted.acc_unit, wanted.acc_lsb),
+        ("gx", wanted.gyr_unit, wanted.gyr_lsb),
     ):
-        if channel in known:
+        if channel in known and not unit:
+            says.append("a unit that import works out")
+        elif channel in known:
             counts = f"{lsb:g} counts/({unit})" if lsb > 1 else f"{unit} x {lsb:g} s"
             says.append(unit if lsb == 1 else counts)
-    return ", ".join(says) or "deg C"
+    return ", ".join(dict.fromkeys(says)) or "deg C"
 
 
 def unit_notes(wanted: ReadOptions) -> dict[str, object]:

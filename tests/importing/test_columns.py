@@ -578,3 +578,21 @@ def test_gravity_tells_rates_that_are_called_as_angles(
         np.testing.assert_allclose(session.block.acc, rows[:, 1:4], rtol=1e-5)
     else:
         assert_same(session, rows)
+
+
+@pytest.mark.parametrize(
+    ("heading", "says"),
+    [
+        ("ax,ay,az,gx,gy,gz", "columns in a unit that import works out"),
+        ("ax [g],ay [g],az [g],gx [deg/s],gy [deg/s],gz [deg/s]", "columns in g, deg/"),
+        ("ax [g],ay [g],az [g],gx,gy,gz", "columns in g, a unit that import works out"),
+    ],
+)
+def test_a_list_names_the_units_that_are_stated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], heading: str, says: str
+) -> None:
+    """And no others: an import works them out, and may find another than SI."""
+    rows = [f"{i / 100:.2f},0.01,0.02,1.0,0.1,0.2,{0.1 * (i % 7)}" for i in range(300)]
+    (tmp_path / "log.csv").write_text("\n".join([f"t [s],{heading}", *rows, ""]))
+    assert main(["import", str(tmp_path / "log.csv"), "--list"]) == 0
+    assert says in capsys.readouterr().out

@@ -167,6 +167,9 @@ def _shown_grids(
 
     The last is the distance from the phase, in steps, up to which the grid is sure.
     """
+    ends = [(np.nanmin(p), np.nanmax(p)) for p in pieces if np.isfinite(p).any()]
+    lowest = min((low for low, _ in ends), default=np.nan)
+    highest = max((high for _, high in ends), default=np.nan)
     for piece in pieces:
         shown, known = shown_values(piece), np.isfinite(piece).sum()
         if not 1 < len(shown) < MANY_VALUES * len(piece) / shown_in(int(known)):
@@ -175,6 +178,8 @@ def _shown_grids(
         # some values may be grid points by chance, but do not come again and again
         if few and len(shown) > FEW_VALUES * len(piece):
             continue
+        if few and shown[0] == lowest and shown[-1] == highest:
+            continue  # an output that goes from one of its limits to the other
         coarse = float(np.diff(shown).min()) if few else step_between(shown)
         if not coarse or coarse < COARSER * step:
             continue

@@ -86,3 +86,16 @@ def test_nothing_stands_still_and_nobody_pushed() -> None:
     assert name == "quantisation"
     assert fault.values["acc"] == pytest.approx(COARSE, rel=1e-3)
     assert fault.from_s == pytest.approx(at, abs=0.1)
+
+
+def test_an_output_between_its_limits_lies_on_no_grid_of_two_values() -> None:
+    """Turned to and fro beyond full scale, it shows hardly anything else."""
+    rng = np.random.default_rng(4)
+    t = np.arange(6000) / 100
+    rate = rng.normal(0.0, 2e-3, (6000, 3))
+    rate[4000:] += 30.0 * np.sin(40.0 * t[4000:, None])
+    gyr = np.clip(np.round(rate / 1e-3) * 1e-3, -0.031, 0.031)
+    acc = rng.normal(0.0, 0.02, (6000, 3)) + [0.0, 0.0, 9.8]
+    grids = grids_by_stretch(Block.of(t, acc, gyr))
+    assert not grids.changed.any()
+    np.testing.assert_allclose(grids.steps[0, 3:], 1e-3, rtol=1e-6)

@@ -24,7 +24,7 @@ Any gap is within 5 % of a whole number by chance once in ten times."""
 
 
 REACHES = (4.0, 32.0, 256.0, np.inf)
-"""Largest of the gaps that tell a step, in the least: better and better."""
+"""Largest gap that tells a step, in the least gap: each reach tells it better."""
 
 FEW_GAPS = 100
 """Gaps that are looked at before all others."""

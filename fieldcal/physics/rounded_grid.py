@@ -18,7 +18,7 @@ TRIED_AT_ONCE, MOST_TRIED, PROBES = 1 << 14, 1 << 20, 24
 """Steps that are tried together, and at all; and values by which they are."""
 
 LONGEST_RUN = 32
-"""Values in a row that bound the step from above: m of them to u / m."""
+"""Neighbouring values that bound the step from above: m of them by about u / m."""
 
 CHANCE = 1e-9
 """Probability of the values below which a step is no matter of chance."""

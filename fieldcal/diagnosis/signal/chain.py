@@ -17,6 +17,7 @@ from fieldcal.core.samples import CHANNELS, Array, Block, Index, Mask
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
+from fieldcal.model.causes.smoothing_left import SMOOTHING
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.orientation import gyro_readings
 from fieldcal.model.rows.reduce import median_sigma
@@ -165,7 +166,7 @@ def with_undone_smoothing(
     about: Description, faults: Iterable[tuple[str, Fault]]
 ) -> Description:
     """The description with what is known of a smoothing that was undone."""
-    fault = next((found for name, found in faults if name == "smoothing"), None)
+    fault = next((found for name, found in faults if name == SMOOTHING), None)
     if fault is None:
         return about
     by_sensor = [

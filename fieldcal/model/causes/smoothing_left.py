@@ -69,7 +69,7 @@ class UndoneSmoothing:
         y = self._smoothed()
 
         def columns(view: RowView) -> Array:
-            """Y' in each row, by the sensors of each part: (n, 6, k)."""
+            """Slope y' in each row, by the sensors of each part: (n, 6, k)."""
             at_rest = view.x.position >= 0
             slope = y.slope(view.x) if at_rest.any() else self._on_the_way(view, y)
             out = np.zeros((len(view.x), 6, len(parts)))
@@ -83,7 +83,7 @@ class UndoneSmoothing:
                     fixed_size=1.0)  # fmt: skip
 
     def _on_the_way(self, view: RowView, y: SmoothedOutputs) -> Array:
-        """Y' at the edges of a turn, (2), from what it was where the device rested."""
+        """Slope y' at the edges of a turn, (2), from that where the device rested."""
         tau = np.repeat(np.where(self.seconds > 0, self.seconds, np.inf), 3)
         x = np.hstack([view.x.f, view.x.w]) * view.state.scale
         out = np.zeros_like(x)
@@ -137,7 +137,7 @@ class SmoothedOutputs:
         return out
 
     def slope_at(self, t: float) -> Array:
-        """Y' just before an instant, (6,)."""
+        """Slope y' just before an instant, (6,)."""
         k = max(int(np.searchsorted(self.t, t)), 1)
         out: Array = (self.y[k] - self.y[k - 1]) / (self.t[k] - self.t[k - 1])
         return out

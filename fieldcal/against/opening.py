@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from fieldcal.against.motion.held import count_positions, what_is_held
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
@@ -71,9 +72,27 @@ def open_simulator_output(
     """
     read = read_output(path)
     if read.about is not None:
+        _check_same_is_held(path, (read.block, read.about), real)
         return read.block, read.about, list(read.says)
     about = _description_of_simulated(path, read.block, read.rests, *real)
     return read.block, about, list(read.says)
+
+
+def _check_same_is_held(
+    path: Path, sim: tuple[Block, Description], real: tuple[Block, Description]
+) -> None:
+    """Refuse a session that holds one position, or moves, unlike the recording.
+
+    What its calibration is would be told by what is usual, not by its samples.
+    """
+    theirs, ours = what_is_held(*sim), what_is_held(*real)
+    if theirs == ours or ours == "motion":
+        return
+    count, wanted = count_positions(*sim), count_positions(*real)
+    raise InputError(
+        f"{path}: shows {count} position{'s' * (count != 1)}, and the recording"
+        f" {wanted}: let the simulator hold the positions of the recording"
+    )
 
 
 def read_output(path: Path) -> SimulatorOutput:

@@ -78,14 +78,14 @@ def _compare_session(args: argparse.Namespace, session: Session) -> ComparedSess
 
 
 def _comparison_method(args: argparse.Namespace, session: Session) -> CompareOutput:
-    """Function that compares: by positions, or by the motion if these are too few."""
+    """Function that compares: by positions, or by the motion if it holds too few."""
     from fieldcal.against import compare_sides
-    from fieldcal.against.motion.held import holds_positions
+    from fieldcal.against.motion.held import what_is_held
     from fieldcal.against.opening import open_simulator_output
     from fieldcal.against.side import diagnose_side
     from fieldcal.commands.progress import SEARCH, show_work
 
-    if args.motion or not holds_positions(session.block, session.about):
+    if args.motion or what_is_held(session.block, session.about) == "motion":
         return partial(_compare_by_motion, args, session)
     with show_work(args, f"{SEARCH} {args.session}"):
         real = diagnose_side(str(args.session), session.block, session.about)

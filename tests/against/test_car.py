@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fieldcal.against.motion.alignment import align_motion
-from fieldcal.against.motion.held import holds_positions
+from fieldcal.against.motion.held import what_is_held
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
 from fieldcal.session import description, description_file
@@ -35,7 +35,8 @@ def test_a_phone_in_a_car_against_the_car(shared: Path, tmp_path: Path) -> None:
     npz = str(folder / "phone_imu.npz")
     assert main(["import", npz, "--columns", PHONE, "-o", str(phone)]) == 0
     assert main(["import", str(log), "--options", options, "-o", str(car)]) == 0
-    assert not holds_positions(Session.open(phone).block, Session.open(phone).about)
+    session = Session.open(phone)
+    assert what_is_held(session.block, session.about) == "motion"
     assert main(["diagnose", str(phone), "--against", str(car)]) == 1
     found = json.loads((phone / "against.json").read_text())
     where = found["alignment"]
@@ -70,19 +71,29 @@ def calm(directions: list[list[float]], angles: bool) -> tuple[Block, object]:
 @pytest.mark.parametrize(
     ("directions", "angles", "holds"),
     [
-        ([[0, 0, 1]] * 4, False, False),
-        ([[0, 0, 1], [0, 1, 0], [1, 0, 0]], False, True),
-        ([[0, 0, 1], [0, 0.1, 0.995], [1, 0, 0]], False, False),
-        ([[0, 0, 1]] * 4, True, True),
-        ([[0, 0, 1]] * 2, True, False),
+        ([[0, 0, 1]] * 4, False, "motion"),
+        ([[0, 0, 1], [0, 1, 0], [1, 0, 0]], False, "positions"),
+        ([[0, 0, 1], [0, 0.1, 0.995], [1, 0, 0]], False, "motion"),
+        ([[0, 0, 1]] * 4, True, "positions"),
+        ([[0, 0, 1]] * 2, True, "motion"),
     ],
 )
 def test_calm_stretches_are_positions_only_if_they_differ(
-    directions: list[list[float]], angles: bool, holds: bool
+    directions: list[list[float]], angles: bool, holds: str
 ) -> None:
     block, about = calm(directions, angles)
     assert isinstance(about, description.Description)
-    assert holds_positions(block, about) is holds
+    assert what_is_held(block, about) == holds
+
+
+@pytest.mark.parametrize(("rest_s", "held"), [(9.5, "one position"), (8.5, "motion")])
+def test_a_device_at_rest_rests_nine_tenths_of_the_time(
+    rest_s: float, held: str
+) -> None:
+    block = Block.of(np.arange(0.0, 10.0, 0.1), np.tile([0.0, 0.0, 9.8], (100, 1)))
+    window = {"start_s": 0.2, "end_s": 0.2 + rest_s}
+    about = description_file.parse_description({"format": 1, "position": [window]})
+    assert what_is_held(block, about) == held
 
 
 def test_what_is_quicker_than_both_share_counts_for_nothing() -> None:

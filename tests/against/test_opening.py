@@ -100,6 +100,44 @@ def test_other_positions_are_refused(tmp_path: Path, folder: Path) -> None:
         open_simulator_output(path, (session.block, session.about))
 
 
+def rest_in(folder: Path, rate: float, seed: int) -> Path:
+    """A session of a device that rests in the first position; `rate` biases gy."""
+    table = strapdown.outputs({**NOISE, "seed": seed})
+    place = strapdown.schedule()[0]
+    kept = (table[:, 0] > place["start_s"]) & (table[:, 0] < place["end_s"])
+    held = table[kept]
+    held[:, 5] += rate
+    unknown = np.full(len(held), np.nan)
+    block = Block.of(held[:, 0], held[:, 1:4], held[:, 4:7], unknown, unknown, unknown)
+    whole = {"start_s": float(held[0, 0]), "end_s": float(held[-1, 0])}
+    site = {"gravity": strapdown.GRAVITY}
+    return write_session(folder, block, [whole], site=site)
+
+
+def test_a_session_of_fewer_positions_is_refused(tmp_path: Path, folder: Path) -> None:
+    session = Session.open(folder)
+    still = rest_in(tmp_path / "still", 0.0, 3)
+    with pytest.raises(InputError, match="shows 1 position, and the recording 9"):
+        open_simulator_output(still, (session.block, session.about))
+    resting = Session.open(still)
+    with pytest.raises(InputError, match="shows 9 positions, and the recording 1"):
+        open_simulator_output(folder, (resting.block, resting.about))
+
+
+def test_two_devices_at_rest_are_compared(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = rest_in(tmp_path / "real", 0.01, 4)
+    sim = rest_in(tmp_path / "sim", 0.0, 5)
+    assert main(["diagnose", str(real), "--against", str(sim)]) == 1
+    assert "no common motion" not in capsys.readouterr().err
+    found = json.loads((real / "against.json").read_text())
+    assert [d["id"] for d in found["differences"]] == ["gyr_bias"]
+    off = found["differences"][0]["parameters"]["y"]["difference"]
+    assert abs(off["value"] - 0.01) < 3 * off["sigma"]
+    assert off["sigma"] < 5e-4
+
+
 @pytest.mark.thorough
 def test_the_command_writes_shows_and_ends_with_what_it_found(
     tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]

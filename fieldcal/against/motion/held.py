@@ -1,10 +1,13 @@
-"""Whether a recording holds positions or is in motion, which decides the comparison.
+"""What a recording holds, which decides the comparison: positions, one, or a motion.
 
-A car on an even road is as calm as a device at rest, but always in the same position.
-Where angles, or rates of a table, are stated, the device was held in positions.
+A car on an even road is as calm as a device at rest, but always in the same position,
+and not all the time. Where angles, or rates of a table, are stated, the device was held
+in positions.
 """
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 
@@ -12,15 +15,32 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 
+Held = Literal["positions", "one position", "motion"]
+
 MAX_SAME_FORCE_COSINE = np.cos(np.deg2rad(10.0))
 """Cosine of the least angle between the forces of two different positions."""
 
+MIN_REST = 0.9
+"""Least part of a recording that windows take up of a device that always rests: the
+rest is its beginning, its end and what a bump takes."""
 
-def holds_positions(block: Block, about: Description) -> bool:
-    """Whether a recording holds enough different positions."""
+
+def what_is_held(block: Block, about: Description) -> Held:
+    """Whether a recording holds several positions, rests throughout, or moves."""
+    count = count_positions(block, about)
+    if count >= thresholds.MIN_ALIKE:
+        return "positions"
+    covered = sum(w[1] - w[0] for w in about.windows if w is not None)
+    length = float(np.ptp(block.t)) if len(block.t) else 0.0
+    always = count == 1 and covered > MIN_REST * length
+    return "one position" if always else "motion"
+
+
+def count_positions(block: Block, about: Description) -> int:
+    """Number of different positions that a recording holds."""
     windows = [w for w in about.windows if w is not None]
     if any(p.alpha is not None or p.rate or p.speed for p in about.positions):
-        return len(windows) >= thresholds.MIN_ALIKE
+        return len(windows)
     seen: list[Array] = []
     for start, end in windows:
         acc = block.between(start, end).acc
@@ -30,4 +50,4 @@ def holds_positions(block: Block, about: Description) -> bool:
         up = force / max(float(np.linalg.norm(force)), 1e-12)
         if all(up @ other < MAX_SAME_FORCE_COSINE for other in seen):
             seen.append(up)
-    return len(seen) >= thresholds.MIN_ALIKE
+    return len(seen)

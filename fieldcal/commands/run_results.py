@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.core.errors import DeviceError, FieldcalError, SessionInUse
+from fieldcal.core.errors import DeviceError, FieldcalError, SessionError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -146,9 +146,9 @@ def report_broken_run(
     from fieldcal.run.begun_before import has_taken_position
     from fieldcal.session.marks import MARKS
 
-    if isinstance(error, SessionInUse):  # who records there says how it goes on
-        return
     own = args.resume or args.records
+    if isinstance(error, SessionError) and not args.records:
+        return  # it says what is wrong with the folder, or who records there
     if not own or not os.path.exists(folder / MARKS):  # False where nobody may look
         return
     if args.junit:

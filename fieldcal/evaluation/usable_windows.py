@@ -91,16 +91,22 @@ def usable_windows(session: Session) -> UsableWindows:
         return _windows_of_means(session)
     refuse_samples_of_no_imu(session.block, session.about.windows)
     dead = dead_sensors(session.block.acc, session.block.gyr)
-    warnings = list(session.warnings)
+    own: list[str] = []
     living = without_dead_axes(session.block, dead)
-    taken = _average_windows(session, living, warnings)
+    taken = _average_windows(session, living, own)
     if not taken:
         raise SessionError(
-            f"{session.folder}: no window can be used; {warnings[-1]}"
+            f"{session.folder}: {_all_of(session.positions)} can be used; {own[-1]}"
             f"{_missing_unit_hint(session.about)}"
         )
+    warnings = [*session.warnings, *own]
     rows = sorted(taken)
     return _windows_without(dead, rows, [taken[i] for i in rows], warnings)
+
+
+def _all_of(positions: Sequence[object]) -> str:
+    many = len(positions) > 1
+    return f"none of the {len(positions)} windows" if many else "no window"
 
 
 def _windows_without(

@@ -94,8 +94,8 @@ def open_recording(
             opened = plugin_class(module.__name__, Recording)  # type: ignore[type-abstract]
             return opened(path, wanted, repair)
     raise InputError(
-        f"{path}: is of no format that is known by its content: name one with --format"
-        f" {'|'.join(formats())}"
+        f"{path}: is of no format that is known by its content: name one with"
+        f" fieldcal import --format {'|'.join(formats())}"
     )
 
 

@@ -88,7 +88,8 @@ class SensorTables(ArrayFile):
             if not {*SENSOR.values()} <= {one.sensor for one in blocks}:
                 raise InputError(
                     f"{self.path}: has not a table of each sensor: copy it again from"
-                    " where it came, or import the one with --format csv_like"
+                    " where it came, or import the one with fieldcal import --format"
+                    " csv_like"
                 )
             self._loaded = {
                 name: table_of(values, unit)

@@ -98,7 +98,7 @@ def read_tokens(path: Path) -> list[str]:
     Raises
     ------
     InputError
-        If it cannot be read, others may read it, or a token is too short.
+        If it cannot be read, others may read it, or a token is short or has a space.
 
     """
     try:
@@ -109,9 +109,10 @@ def read_tokens(path: Path) -> list[str]:
     if os.name == "posix" and mode & 0o077:
         raise InputError(f"{path}: others may read the tokens: chmod 600 {path}")
     found = [one for line in lines if (one := line.split("#")[0].strip())]
-    if not found or min(map(len, found)) < SHORTEST_TOKEN:
+    spaced = any(len(one.split()) > 1 for one in found)
+    if not found or spaced or min(map(len, found)) < SHORTEST_TOKEN:
         raise InputError(
-            f"{path}: a token a line is wanted, of {SHORTEST_TOKEN} letters or more, as"
-            " from openssl rand -hex 24"
+            f"{path}: each line must be one token of {SHORTEST_TOKEN} letters or more,"
+            " as openssl rand -hex 24 makes them, and nothing but # and a name after it"
         )
     return found

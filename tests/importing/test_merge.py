@@ -165,9 +165,14 @@ def test_channels_side_by_side_have_the_same_times(
     write(tmp_path, whole[:-9, [0, 4, 5, 6]], "gyr.csv", names)
     assert main([*call, str(tmp_path / "short")]) == 2
     assert "the other files have ended" in capsys.readouterr().err
-    write(tmp_path, whole + [[0.01, *[0] * 6]], "gyr.csv", HEADING)
-    assert main([*call, str(tmp_path / "late")]) == 2
-    assert "join files with the same times" in capsys.readouterr().err
+    late = whole[:, [0, 4, 5, 6]] + [0.01, 0, 0, 0]
+    write(tmp_path, late, "gyr.csv", names)
+    assert main([*call, str(tmp_path / "late")]) == 0
+    assert "10 ms apart at most" in capsys.readouterr().err
+    write(tmp_path, whole, "gyr.csv", HEADING)
+    assert main([*call, str(tmp_path / "whole")]) == 2
+    said = capsys.readouterr().err
+    assert "holds ax, and so does acc.csv" in said and "--in-order" in said
 
 
 @pytest.mark.parametrize(

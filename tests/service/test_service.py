@@ -377,10 +377,11 @@ def test_tokens_are_secret_and_long(tmp_path: Path) -> None:
     path.chmod(0o644)
     with pytest.raises(InputError, match="chmod 600"):
         read_tokens(path)
-    path.write_text("short\n")
     path.chmod(0o600)
-    with pytest.raises(InputError, match="16 letters"):
-        read_tokens(path)
+    for wrong in ("short", f"station-A-of-the-line {TOKEN}"):
+        path.write_text(wrong)
+        with pytest.raises(InputError, match="one token of 16 letters"):
+            read_tokens(path)
 
 
 def zipped(folder: Path) -> bytes:

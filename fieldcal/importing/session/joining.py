@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import CHANNELS, Block
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.session.merge import (
     SeveralFiles,
@@ -49,7 +50,7 @@ def join_files(files: Sequence[Recording]) -> Recording:
     Raises
     ------
     InputError
-        If there are several thermometers or IMUs in them.
+        If there are several thermometers or IMUs in them, or two hold one channel.
 
     """
     opened = files
@@ -58,6 +59,7 @@ def join_files(files: Sequence[Recording]) -> Recording:
     # of what sensor a file is, is said by now
     count_from_one_day(opened)
     heads = [_head(one, PEEKED) for one in files]
+    _refuse_same_channels(heads)
     warm = [h for h in heads if not (h.measures("acc") or h.measures("gyr"))]
     others = [h for h in heads if h not in warm]
     slow = [h for h in warm if others and not _same_times(h.rows, others[0].rows)]
@@ -73,6 +75,22 @@ def join_files(files: Sequence[Recording]) -> Recording:
 
 def _head(file: Recording, most: int) -> FileHead:
     return FileHead(file, with_clock_times(file).first_rows(stream_name(file), most))
+
+
+def _refuse_same_channels(heads: Sequence[FileHead]) -> None:
+    """Refuse files of which two hold the same channel: only one could be used."""
+    first: dict[str, Path] = {}
+    for head in heads:
+        known = np.isfinite(head.rows.six).any(axis=0)
+        for name in np.array(CHANNELS)[known]:
+            if name in first:
+                raise InputError(
+                    f"{head.file.path}: holds {name}, and so does {first[name].name}:"
+                    " --join is for files with different channels of one IMU; join"
+                    " consecutive recordings of it with --in-order, and import two IMUs"
+                    " one by one"
+                )
+            first[name] = head.file.path
 
 
 def _stem(file: Recording) -> str:

@@ -116,6 +116,12 @@ SESSIONS = (
         "5.9 sigma: a search that took too many causes was no reason against it",
         of_all=True,
     ),
+    Session(
+        75102241,
+        ("slips in its mount",),
+        "123 sigma: a step of the bias has the square of an angle, a linear turn not",
+        of_all=True,
+    ),
 )
 
 MOTIONS = (

@@ -114,11 +114,14 @@ class System(ABC):
                     channel_parts.append((at[shown], table[:, c, shown]))
         return parts
 
-    def linearisation_error(self, state: State, other: State, step: Array) -> float:
+    def linearisation_error(
+        self, state: State, other: State, step: Array, everywhere: bool = False
+    ) -> float:
         """Largest error of the rows of another state, linearised about a state.
 
         `step` (k,) is the change of the columns in the state. In standard deviations of
-        a window's mean; 0 where the rows are linear.
+        a window's mean; 0 where the rows are linear. Windows of unknown orientation
+        count only `everywhere`: what they turn by is free.
         """
         return 0.0
 

@@ -56,10 +56,12 @@ class WindowSystem(System):
         """Rows with a value, by channel, (n, 6)."""
         return self.rows.used
 
-    def linearisation_error(self, state: State, other: State, step: Array) -> float:
+    def linearisation_error(
+        self, state: State, other: State, step: Array, everywhere: bool = False
+    ) -> float:
         """Largest error of the means at another state, linearised about a state, σ.
 
-        Windows of unknown orientation do not count.
+        Windows of unknown orientation count only `everywhere`.
         """
         d, x = self.dictionary, self.rows.x
         outputs, outputs_at_other = (
@@ -70,7 +72,7 @@ class WindowSystem(System):
         for part in self.linearised(state, wanted):
             moved = (outputs_at_other - outputs)[part.rows, part.channel] * part.weight
             off = part.window_means(moved - part.design @ step[part.columns])
-            counted = ~d.unoriented[part.windows]
+            counted = everywhere | ~d.unoriented[part.windows]
             sigmas = np.abs(off) * np.sqrt(part.info)
             largest = max(largest, float(sigmas[counted].max(initial=0.0)))
         return largest

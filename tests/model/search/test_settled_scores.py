@@ -9,6 +9,7 @@ import pytest
 from small_sessions import SD, G, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
+from fieldcal.effects.mount_slip import MountSlip
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import Member
@@ -114,3 +115,56 @@ def test_a_small_angle_needs_no_correction() -> None:
     correct_scores(found)
     assert search.sets.corrections == {}
     assert search.sets.corrected_score(there) == there.score
+
+
+def slip(angles: Array, whole: bool) -> tuple[Array, float]:
+    """Outputs (n, 6) of a device that slips in its mount, and when it does, s.
+
+    The turn is whole, or as far as it is linear in the angles, deg.
+    """
+    x, effect = ladder(), MountSlip()
+    shape = {"at_s": float(x.t[x.position == LAST][1]) - 5.0}
+    y = np.hstack([x.f, x.w])
+    y += effect.change_of_outputs(x, angles, shape) if whole else (
+        effect.design(x, shape) @ angles
+    )  # fmt: skip
+    return y, shape["at_s"]
+
+
+def at_instant(d: Dictionary, key: str, at: float) -> Member:
+    cause = next(c for c in d.causes if c.key == key)
+    return cause, min(cause.variants, key=lambda g: abs(g.shape["at_s"] - at))
+
+
+def test_a_step_of_the_bias_is_held_against_turns_of_its_size() -> None:
+    """Along the force a slip is of second order: a bias has it, a linear turn has not.
+
+    Without their own states, a step of the bias is 1e8 times as likely as either.
+    """
+    angles, rng = np.array([0.5, 0.7, 0.6]), np.random.default_rng(2)
+    noise = SD * rng.standard_normal((len(ladder()), 6))
+    y, at = slip(angles, whole=True)
+    d, search, fit, _ = about_nominal(y + noise)
+    best = search.sets.evaluate((at_instant(d, "bias_step:acc", at),))
+    found = InferenceResult(
+        fit, search, best, nominal(), np.zeros(d.width), [], (), frozenset()
+    )
+    correct_scores(found)
+    slipped = (at_instant(d, "mount_slip", at),)
+    there = search.sets.evaluate(slipped)
+    plain = about_nominal(slip(angles, whole=False)[0] + noise)[1].sets
+    wanted = plain.evaluate((at_instant(plain.dictionary, "mount_slip", at),)).score
+    assert there.score < best.score - 18.0
+    assert search.sets.corrected_score(there) == pytest.approx(wanted, abs=1.0)
+    assert search.sets.corrected_score(there) > best.score - 5.0
+
+
+def test_a_small_slip_needs_no_state_of_its_own() -> None:
+    y, at = slip(np.array([0.02, -0.03, 0.02]), whole=True)
+    d, search, fit, _ = about_nominal(y)
+    best = search.sets.evaluate((at_instant(d, "bias_step:gyr", at),))
+    found = InferenceResult(
+        fit, search, best, nominal(), np.zeros(d.width), [], (), frozenset()
+    )
+    correct_scores(found)
+    assert not search.sets.corrections

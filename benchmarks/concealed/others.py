@@ -29,7 +29,7 @@ APART = (
         *("bias_step", "base_step", "mount_slip", "scale_drift", "scale_step"),
     },
     {"temperature_bias", "temperature_scale"},
-    {"temperature_scale", "scale_drift", "scale_step"},
+    {"temperature_scale", "scale_drift", "scale_step", "high_pass"},
     {"gyro_scale", "gyro_cross_coupling", "angle_scale", "angle_offset", "sway"},
     {"lever_arm", "time_delay", "sway", "hum"},
     {"settling", "joint_creep"},

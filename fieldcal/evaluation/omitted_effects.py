@@ -183,10 +183,11 @@ def with_description_faults(
 def with_impossible_explanation(
     explanation: Explanation, calibration: Calibration
 ) -> Calibration:
-    """The calibration, marked as bad if what explains it best cannot have happened.
+    """The calibration, marked as bad if what explains it best allows none.
 
-    Either nothing explains it, or a scale factor has an impossible value. Those that it
-    states itself are judged by their own values.
+    Nothing explains it, a scale factor has an impossible value, or an effect is shown
+    behind which nothing can be calibrated. Scale factors that it states itself are
+    judged by their own values.
     """
     own = {*calibration.names}
     sentences = [
@@ -198,6 +199,13 @@ def with_impossible_explanation(
     ]
     if unexplained := exhausted_search(explanation):
         sentences.append(f"the recording shows so much that {unexplained}")
+    known = catalogue()
+    sentences += [
+        f"the recording shows {cause.name} (probability {cause.probability:.2f}):"
+        f" {known[cause.name].ruins}"
+        for cause in explanation.probable_causes
+        if cause.name in known and known[cause.name].ruins
+    ]
     if not sentences:
         return calibration
     warnings = (*sentences, *calibration.warnings)

@@ -19,6 +19,10 @@ MIN_WINDOW_ROWS, MAX_WINDOW_ROWS = 8, 120
 FIRST_ROW_S = 1.0
 """Length of the first row of a window, in which settling changes fastest, s."""
 
+INTEGRAL_STEP_S = 0.05
+"""Step at which the integral of the outputs is kept, s: in it a turn by hand changes
+them evenly."""
+
 KNOTS_PER_ROW = 4
 """Knots in each row of the reference's mean over a row, if it has as many samples: what
 is left after that mean is smooth between them."""

@@ -117,6 +117,9 @@ class Effect(ABC):
     """When it adds nothing to biases and scale factors that it changes, in words: they
     are fitted beside it as they are then. Empty for an effect that does not change."""
 
+    ruins: ClassVar[str] = ""
+    """Why nothing can be calibrated that has it, in words; empty where it can."""
+
     decided_by: ClassVar[str]
     cure: ClassVar[str]
     source: ClassVar[str]

@@ -12,8 +12,8 @@ from fieldcal.physics.experience import Experience
 
 PER_ROW = (
     "alpha", "beta", "gamma", "f", "w", "w_dot", "slope", "bend", "missed", "f_dot",
-    "f_bend", "w_bend", "t", "lasts", "since_start", "since_turn", "warming", "heating",
-    "variance", "position", "rate", "speed", "speed_sigma", "attitude_sigma",
+    "f_bend", "w_bend", "passed", "t", "lasts", "since_start", "since_turn", "warming",
+    "heating", "variance", "position", "rate", "speed", "speed_sigma", "attitude_sigma",
     "alpha_axis",
 )  # fmt: skip
 """Fields of `Experience` that have one value per row."""

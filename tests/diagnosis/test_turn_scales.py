@@ -56,6 +56,7 @@ def explained(change: Array, nominal: float = 1.0) -> Explanation:
             fit=SimpleNamespace(nominal=state), exhausted=False
         ),
         "source": SimpleNamespace(about=about),
+        "probable_causes": (),
     }
     return cast(Explanation, SimpleNamespace(**parts))
 

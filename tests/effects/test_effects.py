@@ -38,6 +38,7 @@ def experience() -> Experience:
         slope=rng.standard_normal((ROWS, 6)),
         bend=rng.standard_normal((ROWS, 6)),
         missed=rng.standard_normal((ROWS, 6)),
+        passed=rng.standard_normal((ROWS, 6)),
         f_dot=rng.standard_normal((ROWS, 3)),
         f_bend=rng.standard_normal((ROWS, 3)),
         w_bend=rng.standard_normal((ROWS, 3)),
@@ -93,7 +94,9 @@ def test_adds_nothing_when_it_is_said_to_be_absent(effect: Sensor) -> None:
         np.zeros(1), np.zeros(1), 9.8, **{k: np.full(1, v) for k, v in place.items()}
     )
     assert not effect.design(x, SHAPE | {"tau_s": 100.0, "at_s": 1.0}).any()
-    later = replace(x, t=x.t + 9, since_start=x.t + 9, warming=x.warming + 9)
+    later = replace(
+        x, t=x.t + 9, since_start=x.t + 9, warming=x.warming + 9, passed=x.passed + 9
+    )
     assert effect.design(later, SHAPE | {"tau_s": 100.0, "at_s": 1.0}).any()
 
 

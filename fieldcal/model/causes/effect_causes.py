@@ -197,6 +197,7 @@ def _rows_in_motion() -> Experience:
     held = Experience.at_rest(
         0.1 * two, 0.2 * two, G0, w_dot=six[::-1, ACC], f_dot=six[::-1, GYR],
         slope=six, bend=six, missed=six, f_bend=six[:, ACC], w_bend=six[:, GYR],
+        passed=six,
         variance=six[:, ACC],
         warming=two, heating=two, t=two, since_start=two, since_turn=two,
         position=np.arange(2),

@@ -86,7 +86,7 @@ def rows_at_session_end(x: Experience, alpha: Array, beta: Array) -> Experience:
     return Experience.at_rest(
         alpha, beta, x.gravity, f=force, t=x.t[last], since_start=x.since_start[last],
         since_turn=x.since_turn[last], warming=x.warming[last],
-        heating=x.heating[last], variance=x.variance[last],
+        heating=x.heating[last], variance=x.variance[last], passed=x.passed[last],
         position=np.full(len(alpha), -1), base_force=x.base_force,
         base_rate=x.base_rate, mounting=x.mounting, latitude=x.latitude,
         gravity_sigma=x.gravity_sigma, transport=x.transport,

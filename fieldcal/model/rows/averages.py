@@ -139,6 +139,7 @@ def _experience(
         lasts=length,
         since_start=t - source.block.t[0],
         since_turn=t - source.rest_began[position],
+        passed=source.passed.mean(t, length),
         warming=warming,
         heating=heating,
         variance=np.nan_to_num(variance) / about.nominal["acc_scale"] ** 2,

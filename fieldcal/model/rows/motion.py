@@ -169,6 +169,7 @@ class MotionRows:
             bend=self._own_means([r.bend for r in self._responses]),
             missed=missed,
             f_dot=change[:, ACC], f_bend=bend[:, ACC], w_bend=bend[:, GYR],
+            passed=np.zeros((n, 6)),
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
             since_turn=np.full(n, np.inf), warming=self.warming,
             heating=self.heating, variance=np.zeros((n, 3)),

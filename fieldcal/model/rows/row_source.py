@@ -10,6 +10,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block, Mask
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.block_means import masked
+from fieldcal.model.rows.passed_outputs import PassedOutputs
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.rows.vibration import WindowNoise, measure_window_noise
 from fieldcal.model.rows.window_bounds import window_bounds
@@ -63,6 +64,11 @@ class RowSource:
     def rate(self) -> float:
         """Samples a second."""
         return sampling_rate(self.block)
+
+    @cached_property
+    def passed(self) -> PassedOutputs:
+        """Integral of the outputs since the start."""
+        return PassedOutputs.of(self.block, self.about.nominal)
 
     @cached_property
     def window_noise(self) -> WindowNoise:

@@ -201,6 +201,7 @@ class TurnTracker:
             unknown, unknown, ends.gravity, t=t,
             since_start=t - self.source.block.t[0],
             since_turn=np.full(len(t), np.inf), warming=warming, heating=heating,
+            passed=self.source.passed.at(t),
             variance=np.full((len(t), 3), ends.variance.min(axis=0)),
             position=np.full(len(t), -1), mounting=ends.mounting,
             latitude=ends.latitude, f=f, joint_turns=ends.joint_turns,

@@ -147,6 +147,7 @@ EXPERIENCES = {
         f_bend=RNG.standard_normal((ROWS, 3)),
         w_bend=RNG.standard_normal((ROWS, 3)),
         missed=RNG.standard_normal((ROWS, 6)),
+        passed=RNG.standard_normal((ROWS, 6)),
     ),
 }
 COLUMNS = {name: Columns(x) for name, x in EXPERIENCES.items()}

@@ -1,0 +1,58 @@
+"""What lasts is taken out of the outputs: a high-pass of first order.
+
+    U' = u' - U / tau,    U = u - (1 / tau) (integral of U since the start)          (1)
+
+u output without it and U with it, device axes; 1 / tau in 1/s, of each output. The
+second form is the first one integrated, and holds for any tau: what is recorded is U
+itself, and what it was before the start is a constant that counts as bias. So a bias
+means nothing once such a device has moved on: it follows what was measured. Source: a
+setting of accelerometers for tilt that changes or for shocks; the driver of the ADXL355
+in Zephyr lists corners of 24.7e-4 to 0.0238e-4 times the output rate, which is 0.5 to
+2100 s at 31 to 125 Hz.
+
+>>> import numpy as np
+>>> x = Experience.at_rest(np.zeros(1), np.zeros(1), 9.8, passed=np.full((1, 6), 3.0))
+>>> HighPass().design(x)[0].diagonal()
+array([-3., -3., -3., -3., -3., -3.])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.physics.effect import NO_SHAPE, Sensor, six
+from fieldcal.physics.experience import Experience
+
+
+class HighPass(Sensor):
+    """Corner of each output, as 1 / tau."""
+
+    of_inputs = True
+    params = six("1/s", 1e-3, "1/s", 1e-3)
+    covariate = "integral of the output"
+    seen_in = "time"
+    absent = "at the start"
+    decided_by = "one position for longer: what decays is not there"
+    cure = (
+        "Switch the high-pass filter of the sensors off, and record again: behind it"
+        " neither a bias nor a position lasts."
+    )
+    ruins = (
+        "the outputs forget what lasts: a high-pass filter is in them, and biases"
+        " behind it follow what was measured before; switch it off, and record again"
+    )
+    source = (
+        "driver of the ADXL355 in Zephyr: corners of 2.38e-6 to 2.47e-3 of the rate"
+    )
+
+    def applies(self, x: Experience) -> bool:
+        """Where the outputs were recorded from the start on."""
+        return bool(x.passed.any())
+
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """Minus the integral of each output."""
+        out: Array = -x.passed[:, :, None] * np.eye(6)  # (1)
+        return out

@@ -1,0 +1,60 @@
+"""A recording behind a high-pass filter: it is named, undone, and no calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import strapdown
+from scipy.signal import lfilter
+from session_folders import write_session
+
+from fieldcal.core.samples import Block
+from fieldcal.diagnosis import diagnose
+from fieldcal.evaluation.prepared_session import PreparedSession
+from fieldcal.evaluation.solution import solve_prepared
+from fieldcal.evaluation.usable_windows import usable_windows
+from fieldcal.session.folder import Session
+
+NOISE = {"noise": {"acc": [0.02] * 3, "gyr": [1e-3] * 3}, "seed": 3}
+
+
+def recorded(folder: Path, tau: float) -> Session:
+    """Nine positions of a device behind a high-pass of its accelerometers."""
+    table = strapdown.outputs(NOISE)
+    if np.isfinite(tau):
+        kept = np.exp(-np.median(np.diff(table[:, 0])) / tau)
+        begin = (1 - kept) * table[:1, 1:4]
+        table[:, 1:4], _ = lfilter(
+            [kept, -kept], [1.0, -kept], table[:, 1:4], axis=0, zi=begin
+        )
+    unknown = np.full(len(table), np.nan)
+    block = Block.of(
+        table[:, 0], table[:, 1:4], table[:, 4:7], unknown, unknown, unknown
+    )
+    site = {"gravity": strapdown.GRAVITY}
+    return Session.open(write_session(folder, block, strapdown.schedule(), site=site))
+
+
+@pytest.mark.parametrize("tau", [700.0, 2e4])
+def test_it_is_named_and_refused(tmp_path: Path, tau: float) -> None:
+    session = recorded(tmp_path / "s", tau)
+    found = diagnose(session.block, session.about)
+    (effect,) = (e for e in found.effects if e.id == "high_pass")
+    for axis in ("ax", "ay", "az"):
+        told = effect.parameters.get(axis)
+        if told is not None:
+            assert abs(float(told.value) - 1 / tau) < 4 * float(told.sigma or 0), axis
+    assert float(effect.parameters["ay"].sigma or 1) < 0.05 / tau
+    assert {e.id for e in found.effects} <= {"high_pass", "earth_rate"}
+    made = solve_prepared(PreparedSession(session, usable_windows(session)))
+    assert not made.good
+    assert "high_pass" in made.warnings[0] and "switch it off" in made.warnings[0]
+
+
+def test_without_one_nothing_is_named(tmp_path: Path) -> None:
+    session = recorded(tmp_path / "s", np.inf)
+    found = diagnose(session.block, session.about)
+    assert "high_pass" not in {e.id for e in found.effects}
+    assert solve_prepared(PreparedSession(session, usable_windows(session))).good

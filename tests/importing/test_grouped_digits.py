@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from joined import read_files
 from laid_about import G, turned
@@ -85,6 +85,7 @@ def test_three_numbers_in_a_cell_are_no_thousands() -> None:
     assert GroupedDigits.of([f"{i};{c}" for i, c in enumerate(cells)], None) is None
 
 
+@example(["0 000", "0 000", "0 000"])
 @given(st.lists(st.text(alphabet="0123456789 .,;'-x", max_size=12), max_size=9))
 def test_any_cells_are_grouped_digits_or_are_not(cells: list[str]) -> None:
     """Numbers that stand behind spaces have no sign between thousands."""

@@ -72,8 +72,7 @@ class BareFractions(TextForm):
         rows = [split_cells(line, parted) for line in lines]
         widths, example = {}, None
         for i in range(len(rows[-1])):
-            column = [row[i] for row in rows if i < len(row)]
-            times = [one for cell in column if (one := _bare_seconds(cell))]
+            times = _times([row[i] for row in rows if i < len(row)])
             width = max((len(one.fraction) for one in times), default=0)
             if len(times) <= MOSTLY * len(rows) or not _are_bare(times, width):
                 continue
@@ -103,11 +102,21 @@ def _bare_seconds(cell: str) -> BareSeconds | None:
     return BareSeconds(*said.groups()) if number or is_clock(said[1]) else None
 
 
+def _times(cells: Sequence[str]) -> list[BareSeconds]:
+    """Times in a column; none where a fraction has its leading zeros."""
+    times = []
+    for cell in cells:
+        if (one := _bare_seconds(cell)) is None:
+            continue
+        if one.fraction[0] == "0" != one.fraction:
+            return []
+        times.append(one)
+    return times
+
+
 def _are_bare(times: Sequence[BareSeconds], width: int) -> bool:
     """Whether the fractions of these times count ms or us, `width` digits at most."""
-    if width not in COUNTED or any(
-        one.fraction[0] == "0" != one.fraction for one in times
-    ):
+    if width not in COUNTED:
         return False
     back = 0
     for second in _seconds(times):

@@ -117,9 +117,10 @@ def _groups(cell: str, sign: str) -> int:
     >>> [_groups(cell, ",") for cell in ("1,714,746", "-16,384", "0,123", "16384")]
     [2, 1, 0, 0]
     """
+    cell = cell.strip().lstrip("+-")
     if sign not in cell:
         return 0
-    first, *others = cell.strip().lstrip("+-").split(sign)
+    first, *others = cell.split(sign)
     *whole, last = others
     decimals = re.fullmatch(r"(\d{3})(?:[.,]\d+)?", last)
     begins = re.fullmatch(r"[1-9]\d{0,2}", first) is not None

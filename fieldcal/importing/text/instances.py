@@ -207,10 +207,12 @@ def named_columns(lines: Sequence[str], separator: str | None) -> list[ImuInstan
     found = []
     for tells in (tells_devices, tells_wearers):
         for i in range(len(numbers[-1]) if numbers else 0):
+            said = [row[i] for row in above if tells(row[i])]
+            if not said:
+                continue
             names = dict.fromkeys(row[i] for row in numbers)
             counted = all(is_number(name, False) for name in names)
-            said = [row[i] for row in above if tells(row[i])]
-            if said and not (counted and any(map(may_count, said))):
+            if not (counted and any(map(may_count, said))):
                 clock = _growing(numbers, i, parted)
                 found.append(ImuInstances(i, parted, tuple(names), clock=clock))
     return found

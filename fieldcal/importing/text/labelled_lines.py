@@ -76,7 +76,8 @@ class TitledValues:
 
     def of(self, line: str) -> list[Labelled]:
         """Labels and values of the next line."""
-        called, read = named_values(line)
+        called, labelled = named_values(line)
+        read = [*labelled]
         if called and _is_sensor(called):
             return _of_sensor(read, called, "")
         if not read and self._names_device(line):

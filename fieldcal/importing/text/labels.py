@@ -36,6 +36,10 @@ CLOCKS = frozenset((TIME, TICKS, STAMP))
 LONGEST = 2000
 """Characters of a line of values for people; a dump of bytes in one line has more."""
 
+LINES = 1 << 12
+"""Lines whose values are remembered: the first are read once for each form of a text,
+and again for its names, its units and its rows."""
+
 SHAPES = 256
 """Kinds of lines whose names are remembered: a program prints a few."""
 
@@ -100,19 +104,25 @@ def labelled_values(line: str) -> list[Labelled]:
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
-    return named_values(line)[1]
+    return [*named_values(line)[1]]
 
 
-def named_values(line: str) -> tuple[str, list[Labelled]]:
+def named_values(line: str) -> tuple[str, tuple[Labelled, ...]]:
     """What stands alone before the labels of a line, and what they label.
 
     >>> named_values("A: t: 1 x: 2 y: 3")
-    ('A', [('t', '1'), ('x', '2'), ('y', '3')])
+    ('A', (('t', '1'), ('x', '2'), ('y', '3')))
     """
     if len(line) > LONGEST or not _LETTER.search(line):
-        return "", []
+        return "", ()
+    return _read(line)
+
+
+@lru_cache(LINES)
+def _read(line: str) -> tuple[str, tuple[Labelled, ...]]:
+    """The same of a line that may have labels."""
     if plotted := _PLOTTED.fullmatch(line.strip()):
-        return "", [(TICKS, plotted[2]), (plotted[1].strip(), plotted[3])]
+        return "", ((TICKS, plotted[2]), (plotted[1].strip(), plotted[3]))
     line = _COLOURS.sub("", line)
     prefix = log_prefix(line)
     line = line[prefix.length :] if prefix else line
@@ -127,17 +137,17 @@ def named_values(line: str) -> tuple[str, list[Labelled]]:
         said = _VALUES.fullmatch(text)
         behind = re.findall(NUMBER, said[1]) if said else []
         if said is None or len(behind) not in (1, len(AXES)):
-            return "", []
+            return "", ()
         values += behind
         parts.append((label, len(behind), said[2].strip(" \t,;|")))
     names = _names(tuple(parts))
     if names is None:
-        return "", []
+        return "", ()
     read = [*zip(names, values, strict=True)]
     first = [(TIME, arrival[1].strip())] if read and arrival else []
     first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
     first += [(prefix.name, prefix.value)] if read and prefix else []
-    return name, first + read
+    return name, (*first, *read)
 
 
 @lru_cache(SHAPES)

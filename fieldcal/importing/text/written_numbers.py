@@ -66,13 +66,8 @@ class UnitCells(TextForm):
         rows = [split_cells(line, parted) for line in lines]
         width = len(rows[-1])
         rows = [row for row in rows if len(row) == width]
-        said = [Counter(u for row in rows if (u := _unit_in(row[i])))
-                for i in range(width)]  # fmt: skip
-        units = {}
-        for i, many in enumerate(said):
-            unit, times = many.most_common(1)[0] if many else ("", 0)
-            if times >= max(MIN_ROWS, LEAST * (len(rows) - 2)):
-                units[i] = unit
+        found = {i: _unit_of_most([row[i] for row in rows]) for i in range(width)}
+        units = {i: unit for i, unit in found.items() if unit}
         return cls(parted, units) if units else None
 
     def reader(self) -> Reader:
@@ -104,6 +99,20 @@ def _labelled(line: str) -> bool:
     """Whether the values of a line have labels, which tell more than its cells."""
     names = [heading_meaning(name) for name, _ in labelled_values(line)]
     return any(one is not None and one.kind in ("a", "g") for one in names)
+
+
+def _unit_of_most(cells: Sequence[str]) -> str:
+    """Unit that a column has in nearly all rows; nothing if it has none."""
+    least = max(MIN_ROWS, LEAST * (len(cells) - 2))
+    units: Counter[str] = Counter()
+    for before, cell in enumerate(cells):
+        # most columns have numbers alone: no more of them are looked at than it takes
+        if before - units.total() > len(cells) - least:
+            return ""
+        if unit := _unit_in(cell):
+            units[unit] += 1
+    unit, times = units.most_common(1)[0] if units else ("", 0)
+    return unit if times >= least else ""
 
 
 def _unit_in(cell: str) -> str:

@@ -17,9 +17,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator, Sequence
+from functools import lru_cache
 from typing import NamedTuple, Self
 
 from fieldcal.importing.text.labelled_lines import DEVICE
+from fieldcal.importing.text.labels import LINES
 from fieldcal.importing.text.repeated_lines import NUMBER
 from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
 from fieldcal.importing.words.sensor_words import AXES
@@ -130,6 +132,7 @@ def _device(line: str, before: str) -> str:
     return before if streamed is None else streamed["device"]
 
 
+@lru_cache(LINES)
 def _channel(line: str) -> Channel | None:
     """What a line says of an IMU or its temperature; None if nothing.
 

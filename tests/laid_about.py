@@ -18,7 +18,7 @@ GYR = {"rad/s": 1.0, "deg/s": 180 / np.pi} | {
 SIDES = [(0, 0, 1), (0, 1, 0), (0, 0, -1), (1, 0, 0), (0, -1, 0), (-1, 0, 0), (0, 0, 1)]
 
 
-def turned(seed: int, rate: float, hold: float = 3.0, sides: int = 5) -> Array:
+def turned(seed: int, rate: float, hold: float = 2.0, sides: int = 5) -> Array:
     """Rows t, a, w of a device that is laid on some of `SIDES` in turn, SI.
 
     Five have every axis along gravity once, and turn about two; all seven have each

@@ -36,7 +36,7 @@ def smoothed(outputs: Array, part: float) -> Array:
 def test_the_filtered_copy_of_a_device_is_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], part: float, first: bool
 ) -> None:
-    table = turned(21, 100.0)
+    table = turned(21, 100.0, 3.0)
     pair = [table[:, 1:], smoothed(table[:, 1:], part)]
     rows = np.column_stack([table[:, 0], *(pair[::-1] if first else pair)])
     assert main(["import", str(write(tmp_path, rows, heading=TWICE)),
@@ -95,7 +95,7 @@ def test_a_filter_may_know_later_samples(
     filtered: Callable[[Array], Array], first: bool
 ) -> None:
     """Its steps hardly have the sign of what goes into it."""
-    outputs = turned(22, 100.0)[:, 1:]
+    outputs = turned(22, 100.0, 3.0)[:, 1:]
     pair = [outputs, filtered(outputs)]
     table = np.column_stack([outputs[:, 0], *(pair[::-1] if first else pair)])
     at = {i: {c: n + 1 for c, n in own.items()} for i, own in AT.items()}

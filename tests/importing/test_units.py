@@ -172,7 +172,7 @@ def test_zeros_in_the_middle_of_16_bits_are_no_gravity(
     tmp_path: Path, lsb: float, capsys: pytest.CaptureFixture[str]
 ) -> None:
     # of three sides no sphere tells where zero lies
-    rows = turned(8, 50.0)[:600]
+    rows = turned(8, 50.0, 3.0)[:600]
     rows[:, 1:4] = np.round(rows[:, 1:4] * lsb / G) + 33000
     path = write(tmp_path, rows, heading=COLUMNS)
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2

@@ -26,7 +26,7 @@ sys.dont_write_bytecode = False
 settings.register_profile(
     "any machine",
     deadline=None,
-    max_examples=40,
+    max_examples=25,
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile("all", settings.get_profile("any machine"), max_examples=100)

@@ -256,7 +256,9 @@ def test_windows_without_noise_or_without_an_axis_do_not_count() -> None:
     assert bias_removal_probability(windows, block, KEEPS) == (0.0, "")
 
 
-@pytest.mark.parametrize(("size", "most"), [(0.1, 3), (0.3, 1)])
+@pytest.mark.parametrize(
+    ("size", "most"), [(0.1, 3), pytest.param(0.3, 1, marks=pytest.mark.thorough)]
+)
 def test_a_bias_that_is_merely_small_is_kept(size: float, most: int) -> None:
     """As after a calibration; the dependence on how the device lies is as small.
 

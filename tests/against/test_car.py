@@ -24,6 +24,7 @@ EPOCH = 1_533_200_000.0
 """By how much the bus was stamped ahead of the phone when its log was written, s."""
 
 
+@pytest.mark.thorough
 def test_a_phone_in_a_car_against_the_car(shared: Path, tmp_path: Path) -> None:
     folder = shared / "real" / "comma_rav4_can"
     if not folder.is_dir():

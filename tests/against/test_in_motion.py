@@ -202,6 +202,7 @@ def test_a_long_delay_is_no_filter_of_either_triad() -> None:
     assert np.abs(pulls(one, found)).max() < 4.5
 
 
+@pytest.mark.thorough
 def test_a_filter_that_is_nothing_beside_a_delay_is_tried_all_the_same() -> None:
     """Linearised about no filter it explains less than a delay leaves."""
     one, found, _ = compared(26, 34_800)
@@ -312,7 +313,7 @@ def test_too_little_in_common_is_refused(true: Block) -> None:
 @pytest.mark.parametrize(
     ("real", "sim", "says"),
     [
-        (slice(3, 6), slice(0, 0), []),
+        pytest.param(slice(3, 6), slice(0, 0), [], marks=pytest.mark.thorough),
         (slice(0, 0), slice(0, 3), ["simulator: has no accelerometers"]),
     ],
 )

@@ -121,7 +121,13 @@ def _stuck() -> dict[str, object]:
     return {"channel": "ax", "from_s": 1.0, "to_s": 2.0}
 
 
-@pytest.mark.parametrize("seed", [76000300, 76000304, 76000309])
+@pytest.mark.parametrize(
+    "seed",
+    [
+        76000309,
+        *(pytest.param(s, marks=pytest.mark.thorough) for s in (76000300, 76000304)),
+    ],
+)
 def test_what_is_left_of_a_smoothing_is_no_effect_of_the_sensors(seed: int) -> None:
     """Known to 0.2 to 15 %: what is left was taken for a `bandwidth` of its own."""
     session = kinds()["smoothing"][0](np.random.default_rng(seed))

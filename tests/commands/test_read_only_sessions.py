@@ -34,9 +34,9 @@ def read_only(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("command", "shows"),
     [
-        ("solve", "acc bias x"),
+        pytest.param("solve", "acc bias x", marks=pytest.mark.thorough),
         pytest.param("diagnose", "probability", marks=pytest.mark.thorough),
-        pytest.param("noise", "white N", marks=pytest.mark.thorough),
+        ("noise", "white N"),
     ],
 )
 def test_it_is_shown_and_said_not_to_be_kept(

@@ -38,7 +38,11 @@ def read_as(
     return write_session(folder, read, positions)
 
 
-@pytest.mark.parametrize("unit", [1.0, DEG], ids=["rad/s", "deg/s"])
+@pytest.mark.parametrize(
+    "unit",
+    [pytest.param(1.0, marks=pytest.mark.thorough), DEG],
+    ids=["rad/s", "deg/s"],
+)
 def test_a_turn_inside_the_windows_tells_no_unit(
     unit: float, block: Block, tmp_path: Path
 ) -> None:

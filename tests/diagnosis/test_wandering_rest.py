@@ -34,7 +34,7 @@ def walk(seconds: float, seed: int) -> Array:
 
 
 @pytest.mark.parametrize("seconds", [5.0, 10.0])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.thorough)])
 def test_a_walk_of_a_tenth_of_gravity_is_no_flicker(
     tmp_path: Path, seconds: float, seed: int
 ) -> None:

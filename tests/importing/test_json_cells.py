@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_circle import one_in
 from hypothesis import given
 from hypothesis import strategies as st
 from joined import read_files
@@ -60,10 +61,12 @@ FORMS = {
 
 @pytest.mark.parametrize(
     ("before", "form"),
-    [("{:.0f} ", "labels"), ("{:.0f}, ", "labels"), ("{:.0f},", "equal"),
-     ("{:.0f}: ", "vectors"), ("{:.0f}\t", "equal"), ("{:.0f} | ", "vectors"),
-     ("({:.0f}) ", "labels"), ("{:.0f} > ", "equal"), ("{:.0f} ", "json"),
-     ("{:.0f},", "json")],
+    one_in(3, [
+        ("{:.0f} ", "labels"), ("{:.0f},", "equal"), ("{:.0f}, ", "labels"),
+        ("{:.0f}: ", "vectors"), ("{:.0f} ", "json"), ("{:.0f} | ", "vectors"),
+        ("{:.0f},", "json"), ("{:.0f} > ", "equal"), ("({:.0f}) ", "labels"),
+        ("{:.0f}\t", "equal"),
+    ]),
 )  # fmt: skip
 def test_a_bare_number_before_what_has_names_is_the_time(
     tmp_path: Path, before: str, form: str

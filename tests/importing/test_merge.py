@@ -58,7 +58,9 @@ def stamped(path: Path, rows: Array, columns: list[int]) -> Path:
     [
         ("--in-order", 1714564800.0, "2024-05-01T12:00:00+00:00"),
         ("--join", 1714564800.0, "2024-05-01T12:00:00+00:00"),
-        ("", 1714564800.0, "2024-05-01T12:00:00+00:00"),
+        pytest.param(
+            "", 1714564800.0, "2024-05-01T12:00:00+00:00", marks=pytest.mark.thorough
+        ),
         ("--in-order", 0.4, None),
         pytest.param("--join", 0.4, None, marks=pytest.mark.thorough),
         pytest.param("", 0.4, None, marks=pytest.mark.thorough),

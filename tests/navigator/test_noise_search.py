@@ -77,7 +77,10 @@ def test_any_noise_within_its_bounds_has_an_evidence(which: int) -> None:
     assert np.isfinite([found.score, *evidence_slopes(rows, found, noise)]).all()
 
 
-@pytest.mark.parametrize("start", [None, NOISE_LEAST, NOISE_MOST])
+@pytest.mark.parametrize(
+    "start",
+    [None, NOISE_LEAST, pytest.param(NOISE_MOST, marks=pytest.mark.thorough)],
+)
 def test_the_noise_is_that_of_the_outputs_from_any_start(
     start: tuple[float, ...] | None,
 ) -> None:

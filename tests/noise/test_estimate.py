@@ -217,8 +217,10 @@ def test_a_filter_in_the_device_does_not_make_white_noise_smaller() -> None:
 
 
 @pytest.mark.statistical
-@pytest.mark.statistical
-@pytest.mark.parametrize(("rate", "corner", "order"), [(100, 5, 2), (200, 20, 2)])
+@pytest.mark.parametrize(
+    ("rate", "corner", "order"),
+    [(100, 5, 2), pytest.param(200, 20, 2, marks=pytest.mark.thorough)],
+)
 def test_the_bend_of_a_filter_below_its_corner_is_not_taken_for_less_noise(
     rate: int, corner: int, order: int
 ) -> None:
@@ -245,7 +247,14 @@ def test_a_minute_that_looks_filtered_by_chance_still_tells_its_white_noise() ->
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize(("name", "size"), [("K", 0.02), ("B", 0.05), ("Q", 0.02)])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        pytest.param("K", 0.02, marks=pytest.mark.thorough),
+        ("B", 0.05),
+        pytest.param("Q", 0.02, marks=pytest.mark.thorough),
+    ],
+)
 def test_every_process_is_found_or_has_a_limit_that_holds(
     name: str, size: float
 ) -> None:

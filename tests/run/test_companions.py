@@ -108,6 +108,7 @@ def test_three_devices_on_three_links_have_a_session_and_a_result_each(
     assert kept.calibration.to_json() == result["further"]["device-2"]
 
 
+@pytest.mark.thorough
 def test_a_run_that_is_killed_goes_on_with_what_is_left(tmp_path: Path) -> None:
     """Nobody recorded the turn, and of two positions nothing else bears witness.
 

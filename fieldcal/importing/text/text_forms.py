@@ -261,8 +261,10 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
     It is two if a line above the numbers has as many words as they have.
     """
     said = IN_LINE.search(lines[-1])
+    if said is None:
+        return None
     others = {len(line.split()) for line in lines if not IN_LINE.search(line)}
-    if said is None or len(lines[-1].split()) in others:
+    if len(lines[-1].split()) in others:
         return None
     return len(lines[-1][: said.start()].split())
 

@@ -122,25 +122,29 @@ def split_cells(line: str, separator: str | None) -> list[str]:
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
+def _count_cells(line: str, separator: str | None) -> int:
+    """How many cells a line has, which is seen sooner than what they are."""
+    if separator is None or '"' in line:
+        return len(split_cells(line, separator))
+    return line.count(separator) + 1
+
+
 def first_numbers(lines: Sequence[str], separator: str | None) -> int:
     """Which of the lines is the first of numbers; how many there are if none is."""
     parted = [separator or find_separator(line) for line in lines]
-    rows = [split_cells(line, s) for line, s in zip(lines, parted, strict=True)]
-    many = Counter(len(row) for row in rows if len(row) >= NARROWEST)
+    widths = [_count_cells(line, s) for line, s in zip(lines, parted, strict=True)]
+    many = Counter(wide for wide in widths if wide >= NARROWEST)
     # a line into which another broke is wider than all others
-    width = (
-        max(many, key=lambda n: (many[n], n))
-        if many
-        else max(map(len, rows), default=0)
-    )
-    for i, (row, s) in enumerate(zip(rows, parted, strict=True)):
+    width = max(many, key=lambda n: (many[n], n)) if many else max(widths, default=0)
+    for i, (line, s) in enumerate(zip(lines, parted, strict=True)):
+        row = split_cells(line, s)
         said = [cell for cell in row if cell]
         if len(row) < min(NARROWEST, width) or not said:
             continue
         numbers = sum(is_number(cell, s != ",") for cell in said)
         # one that lacks a cell, as a setting does, is no row by itself
-        alike = rows[i + 1 : i + 2] and len(rows[i + 1]) == len(row)
-        wide = s is None or len(row) >= width - bool(alike)
+        alike = widths[i + 1 : i + 2] == [len(row)]
+        wide = s is None or len(row) >= width - alike
         enough = numbers > NUMBERS * len(said) and numbers >= min(NARROWEST, width)
         if enough and wide and not _numbers_columns(said):
             return i

@@ -33,7 +33,8 @@ class FortranNumbers(TextForm):
         """The form, if most lines have such numbers."""
 
         def is_so(line: str) -> bool:
-            return bool(_DOUBLE.search(line))
+            # most lines have no such letter, which is seen sooner
+            return ("d" in line or "D" in line) and bool(_DOUBLE.search(line))
 
         return cls() if is_true_of_most(lines, is_so) else None
 

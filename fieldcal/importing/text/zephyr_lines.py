@@ -74,7 +74,7 @@ class ZephyrLines(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if most lines have it."""
-        told = [line for line in lines if not _ASKED.match(line)]
+        told = [line for line in lines if not _asked(line)]
         if not is_true_of_most(told, lambda line: _is_channel(line)):
             return None
         read = [one for line in told if (one := _channel(line)) is not None]
@@ -120,12 +120,19 @@ class ZephyrLines(TextForm):
 
 
 def _is_channel(line: str) -> bool:
-    return bool(_CHANNEL.match(line) or _STREAM.match(line))
+    # most lines have neither sign, which is seen sooner
+    told = "channel" in line and _CHANNEL.match(line) is not None
+    return told or ("ns" in line and _STREAM.match(line) is not None)
+
+
+def _asked(line: str) -> re.Match[str] | None:
+    """What the shell was asked for in a line; None of another line."""
+    return _ASKED.match(line) if "~$" in line else None
 
 
 def _device(line: str, before: str) -> str:
     """The device that a line is of, which the shell was asked for `before`."""
-    asked = _ASKED.match(line)
+    asked = _asked(line)
     if asked is not None:
         return asked[1]
     streamed = _STREAM.match(line)

@@ -155,7 +155,7 @@ def _direction(up: Array) -> Array:
 def _closure_errors(turn: TurnBetweenRests, scales: Array) -> Array:
     """Closure of a turn at each of the scales (k,), rad."""
     u = np.tile(turn.before, (len(scales), 1))
-    size = np.array([np.linalg.norm(angle) for angle in turn.angles])
+    size = np.linalg.norm(turn.angles, axis=1)
     angles, size = turn.angles[size > 0], size[size > 0]
     axes, by = angles / size[:, None], size[:, None, None] / scales[:, None]
     steps = zip(axes, cross_matrix(axes), np.cos(by), np.sin(by), strict=True)

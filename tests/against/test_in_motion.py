@@ -202,7 +202,6 @@ def test_a_long_delay_is_no_filter_of_either_triad() -> None:
     assert np.abs(pulls(one, found)).max() < 4.5
 
 
-@pytest.mark.thorough
 def test_a_filter_that_is_nothing_beside_a_delay_is_tried_all_the_same() -> None:
     """Linearised about no filter it explains less than a delay leaves."""
     one, found, _ = compared(26, 34_800)

@@ -182,7 +182,6 @@ def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
     assert batch.unprocessed() == [str(found[0])]
 
 
-@pytest.mark.thorough
 def test_a_session_counts_again_if_the_copy_that_replaced_it_is_gone(
     tree: Path, tmp_path: Path
 ) -> None:

@@ -22,7 +22,7 @@ RATE = 50.0
 
 def recorded(folder: Path, jump: float, windows: int = 7) -> np.ndarray:
     """A session as another program wrote it, its clock set in the middle."""
-    rows = turned(3, RATE)
+    rows = turned(3, RATE, 3.0, sides=7)
     n, t = len(rows), rows[:, 0]
     later = np.where(np.arange(n) < n // 2, 0.0, jump)
     with SampleWriter(folder / "samples.parquet") as file:

@@ -23,6 +23,9 @@ LEAST = 2
 PARTS = 4
 """Parts of a recording that have as much of its turns each, and must agree."""
 
+MOST_FOR_MEDIAN = 1 << 14
+"""Intervals of which the median is taken at most."""
+
 _AT_ONCE = 4096
 """Intervals that are read together."""
 
@@ -52,23 +55,36 @@ def late_rates(rows: CellRows) -> str:
 def _activities(rows: CellRows) -> tuple[Array, Array]:
     """Changes of the force and rates from interval to interval, (n,) each.
 
-    Beside a pause, and where either sensor has no value, both are 0.
+    Beside a pause, and where either sensor has no value, both are 0. No more than these
+    two numbers of an interval is kept: there are 10 of them a second.
     """
-    times: list[Array] = [np.empty(0)]
-    means: list[Array] = [np.empty((0, 6))]
-    for first in range(0, len(rows), _AT_ONCE):
-        cells = cell_table(rows[first : first + _AT_ONCE], np.zeros(6))
-        times.append(cells.times)
-        means.append(cells.means)
-    t, six = np.concatenate(times), np.concatenate(means)
-    if len(t) < 2 or not np.isfinite(six).all(axis=1).any():
+    at_rest = _median_rate(rows)
+    if np.isnan(at_rest).any():
         return np.empty(0), np.empty(0)
-    at_rest = np.nanmedian(six[:, 3:], axis=0)
-    change = np.linalg.norm(np.diff(six[:, :3], axis=0), axis=1)
-    between = (six[1:, 3:] + six[:-1, 3:]) / 2 - at_rest
-    rate = np.linalg.norm(between, axis=1)
-    known = np.isfinite(change + rate) & (np.diff(t) < 2 * CELL)
-    return np.where(known, change, 0.0), np.where(known, rate, 0.0)
+    out = np.zeros((2, max(len(rows) - 1, 0)), dtype=np.float32)
+    for first in range(0, len(rows) - 1, _AT_ONCE):
+        cells = cell_table(rows[first : first + _AT_ONCE + 1], np.zeros(6))
+        t, six = cells.times, cells.means
+        change = np.linalg.norm(np.diff(six[:, :3], axis=0), axis=1)
+        between = (six[1:, 3:] + six[:-1, 3:]) / 2 - at_rest
+        both = np.stack([change, np.linalg.norm(between, axis=1)])
+        known = np.isfinite(both).all(axis=0) & (np.diff(t) < 2 * CELL)
+        out[:, first : first + _AT_ONCE] = np.where(known, both, 0.0)
+    return out[0], out[1]
+
+
+def _median_rate(rows: CellRows) -> Array:
+    """Rates (3,) that the gyroscopes read for most of a recording; nan without any."""
+    stride = len(rows) // MOST_FOR_MEDIAN + 1
+    some = [
+        cell_table(rows[first : first + _AT_ONCE], np.zeros(6)).means[::stride]
+        for first in range(0, len(rows), _AT_ONCE)
+    ]
+    six = np.concatenate([np.empty((0, 6)), *some])
+    if not np.isfinite(six).all(axis=1).any():
+        return np.full(3, np.nan)
+    out: Array = np.nanmedian(six[:, 3:], axis=0)
+    return out
 
 
 def _best_shifts(changes: Array, rates: Array) -> Array:

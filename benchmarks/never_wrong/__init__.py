@@ -213,12 +213,12 @@ def _try(seed: int, options: Options, rows: dict[str, list[Judged]]) -> None:
     bench, names, one = draw_and_judge(seed, options)
     rows[names[0] if names else SOUND].append(one)
     odd = one.wrong or one.over if one.go else not names
-    if odd or one.late or options.each:
+    if odd or one.late or one.leaked or options.each:
         what = "GO" if one.go else f"NO-GO ({one.caught}: {one.says})"
         print(
             f"seed {seed} {bench.places}, {', '.join(names) or SOUND}: {what},"
             f" {one.off:.1f} σ ({one.worst}){', beyond a limit' * one.over}"
-            f" {one.verdict}",
+            f" {one.verdict}{', a warning came through' * bool(one.leaked)}",
             flush=True,
         )
 

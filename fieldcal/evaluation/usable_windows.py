@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.calibration.gauge import SI
-from fieldcal.core.errors import FieldcalError, SessionError
+from fieldcal.core.errors import FieldcalError, InputError, SessionError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Block, Grain
 from fieldcal.core.sentences import join_words
 from fieldcal.evaluation.window_mean import (
@@ -33,6 +33,7 @@ from fieldcal.session.folder import Session
 from fieldcal.session.refused_samples import refuse_samples_of_no_imu
 from fieldcal.windows import Average, LearnedNoise
 from fieldcal.windows.dead_axis import DeadSensor, dead_sensors, without_dead_axes
+from fieldcal.windows.high_pass import decay_time_constant
 from fieldcal.windows.noise import converter_noise
 
 RANGE_TOLERANCE = 1e-6
@@ -77,8 +78,8 @@ def usable_windows(session: Session) -> UsableWindows:
     SessionError
         If it has no position, or no window of any position can be used.
     InputError
-        If windows overlap, a channel is another's copy, accelerations are a direction,
-        or samples are of two devices.
+        If windows overlap, a channel is another's copy, accelerations are a direction
+        or behind a high-pass filter, or samples are of two devices.
 
     """
     if not session.positions:
@@ -90,6 +91,12 @@ def usable_windows(session: Session) -> UsableWindows:
     if session.about.means_only:
         return _windows_of_means(session)
     refuse_samples_of_no_imu(session.block, session.about.windows)
+    if tau := decay_time_constant(session.block, session.about.windows):
+        raise InputError(
+            f"{session.folder}: what the accelerometers read at rest decays toward 0,"
+            f" with a time constant of {tau:.3g} s: they are behind a high-pass filter;"
+            " switch it off, and record again"
+        )
     dead = dead_sensors(session.block.acc, session.block.gyr)
     own: list[str] = []
     living = without_dead_axes(session.block, dead)

@@ -10,6 +10,7 @@ import strapdown
 from scipy.signal import lfilter
 from session_folders import write_session
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis import diagnose
 from fieldcal.evaluation.prepared_session import PreparedSession
@@ -51,6 +52,14 @@ def test_it_is_named_and_refused(tmp_path: Path, tau: float) -> None:
     made = solve_prepared(PreparedSession(session, usable_windows(session)))
     assert not made.good
     assert "high_pass" in made.warnings[0] and "switch it off" in made.warnings[0]
+
+
+def test_behind_a_quick_one_no_window_is_a_rest(tmp_path: Path) -> None:
+    session = recorded(tmp_path / "s", 12.0)
+    with pytest.raises(
+        InputError, match=r"decays toward 0, .* 12.1 s: .* switch it off"
+    ):
+        usable_windows(session)
 
 
 def test_without_one_nothing_is_named(tmp_path: Path) -> None:

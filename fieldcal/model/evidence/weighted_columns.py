@@ -48,7 +48,8 @@ class SplitColumns:
 
     Attributes
     ----------
-    wide : (u,) columns of this matrix with means in several windows, or in wide blocks
+    wide : (u,) columns of this matrix with means in several windows, or in wide blocks;
+        all if these are the most
     single, window, means : (s,), (s,), (s, 6) all others, their windows, and the means
 
     """
@@ -62,6 +63,8 @@ class SplitColumns:
         wide = touched.sum(axis=0) > 1
         for at, one in zip(places, alone, strict=True):
             wide[at[~one]] = True
+        if 2 * wide.sum() > len(wide):
+            wide[:] = True  # taking some of many columns apart costs more than it saves
         self.wide, self.single = np.flatnonzero(wide), np.flatnonzero(~wide)
         self.window = touched[:, self.single].argmax(axis=0)
         self.means = gram.means[self.window, :, self.single]
@@ -101,7 +104,11 @@ class WeightedColumns:
         """
         split, gram, out = self._split, self._split.gram, within.copy()
         white = self.rows.whiten(gram.means[:, :, gram.index[columns]])
-        out[:, split.wide] += white[gram.info > 0].T @ self._wide
+        shared = white[gram.info > 0].T @ self._wide
+        if not len(split.single):
+            out += shared
+            return out
+        out[:, split.wide] += shared
         alone = self._single[:, None] @ white[split.window]  # (s, 1, c)
         out[:, split.single] += alone[:, 0].T
         return out

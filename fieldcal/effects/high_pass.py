@@ -49,8 +49,19 @@ class HighPass(Sensor):
     )
 
     def applies(self, x: Experience) -> bool:
-        """Where the outputs were recorded from the start on."""
+        """Where the outputs were recorded, in more than one position.
+
+        In one it is like a drift of the biases, which every device has.
+        """
+        return bool(x.passed.any() and len(np.unique(x.position[x.position >= 0])) > 1)
+
+    def acts_on(self, x: Experience) -> bool:
+        """On all rows, also those of one position and of turns."""
         return bool(x.passed.any())
+
+    def chance(self, x: Experience) -> float:
+        """A setting that nobody wants for calibration: one in a thousand."""
+        return 1e-3
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Minus the integral of each output."""

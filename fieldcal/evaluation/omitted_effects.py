@@ -199,17 +199,23 @@ def with_impossible_explanation(
     ]
     if unexplained := exhausted_search(explanation):
         sentences.append(f"the recording shows so much that {unexplained}")
-    known = catalogue()
-    sentences += [
-        f"the recording shows {cause.name} (probability {cause.probability:.2f}):"
-        f" {known[cause.name].ruins}"
-        for cause in explanation.probable_causes
-        if cause.name in known and known[cause.name].ruins
-    ]
+    sentences += _ruining_effects(explanation)
     if not sentences:
         return calibration
     warnings = (*sentences, *calibration.warnings)
     return replace(calibration, warnings=warnings, good=False)
+
+
+def _ruining_effects(explanation: Explanation) -> list[str]:
+    """Sentences on effects, likely by themselves, that allow no calibration."""
+    named = {cause.name for cause in explanation.probable_causes} & {*catalogue()}
+    ruining = {name: why for name in named if (why := catalogue()[name].ruins)}
+    chances = {name: explanation.posterior.probability([name]) for name in ruining}
+    return [
+        f"the recording shows {name} (probability {p:.2f}): {ruining[name]}"
+        for name, p in sorted(chances.items())
+        if p >= thresholds.NAMED
+    ]
 
 
 def with_omitted_effects(

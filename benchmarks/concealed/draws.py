@@ -45,7 +45,7 @@ USUAL: Mapping[str, float] = {
 TIMED = (
     *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift", "bias_step"),
     *("settling", "hum", "base_step", "mount_slip", "joint_creep"),
-    *("scale_drift", "scale_step", "high_pass"),
+    *("scale_drift", "scale_step"),
 )
 EQUATIONS = (*USUAL, *TIMED, "sway", "time_delay", "heading_error")
 """Effects with numbers that can be made larger and smaller."""
@@ -112,9 +112,6 @@ def drawn(name: str, rng: np.random.Generator, span: float) -> Values:
             "hz": float(rng.uniform(0.2, 2.0)),
             "azimuth_deg": float(rng.uniform(0, 180)),
         },
-        "high_pass": dict.fromkeys(
-            ("ax", "ay", "az"), float(np.exp(rng.uniform(np.log(3e-6), np.log(1e-4))))
-        ),
     }
     return more[name]
 

@@ -18,7 +18,7 @@ from fieldcal.sim_device.profile_file import profile_from_tables
 CHANCE = ("angle_setting", "random_walk")
 CHAIN = (
     *("bump", "stuck", "quantisation", "saturation", "dropped", "clock_skew"),
-    *("decode_fault", "noise_level", "mounting", "smoothing"),
+    *("decode_fault", "noise_level", "mounting", "smoothing", "high_pass"),
 )
 SPECIAL = ("gravity_error", "earth_rate", "bandwidth", "vibration_rectification")
 APART = (
@@ -29,7 +29,7 @@ APART = (
         *("bias_step", "base_step", "mount_slip", "scale_drift", "scale_step"),
     },
     {"temperature_bias", "temperature_scale"},
-    {"temperature_scale", "scale_drift", "scale_step", "high_pass"},
+    {"temperature_scale", "scale_drift", "scale_step"},
     {"gyro_scale", "gyro_cross_coupling", "angle_scale", "angle_offset", "sway"},
     {"lever_arm", "time_delay", "sway", "hum"},
     {"settling", "joint_creep"},
@@ -150,6 +150,9 @@ def chain(name: str, rng: np.random.Generator) -> Session:
         "noise_level": {"channel": channel, "ratio": float(rng.uniform(2.5, 6))},
         "mounting": {"axes": str(rng.choice(axes))},
         "smoothing": dict.fromkeys(("acc", "gyr"), float(rng.uniform(0.15, 1.5))),
+        "high_pass": dict.fromkeys(
+            ("ax", "ay", "az"), float(10 ** rng.uniform(-5.5, -3))
+        ),
     }  # fmt: skip
     host = effects.kind(name).EXAMPLE.host_clock
     session = replace(session, label=name, host_clock=host)

@@ -4,7 +4,9 @@
 
 Found where a channel's largest or smallest value is taken again and again: at the
 declared range, or far more often than the value next to it: in several places, or in
-one that the channel runs into and comes out of. Source: model of this project.
+one that the channel runs into and comes out of. Two axes that stop at the same value
+need not come out of it: each of its own would stick anywhere. Source: model of this
+project.
 
 >>> import numpy as np
 >>> signal = np.clip(np.sin(np.arange(200) / 7.0), -0.9, 0.9)
@@ -16,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, runs_of_true
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault, Rows
 
@@ -25,6 +27,9 @@ MIN_RAIL_SAMPLES = 5
 
 RAIL_RATIO = 4.0
 """Ratio of samples at the rail to samples at the value next to it."""
+
+SAME = 1e-6
+"""Relative difference of values that are the same but for their conversion."""
 
 UNDER_WAY = 5
 """Number of samples next to a run that must move towards the rail."""
@@ -45,7 +50,7 @@ def samples_at_rails(values: Array, limit: float, coarse: bool = False) -> list[
     out = []
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     alike = low < 0 and abs(high + low) < 1e-3 * high and not np.isfinite(limit)
-    for edge in (low, high):
+    for edge in dict.fromkeys((low, high)):
         at = np.flatnonzero(values == edge)
         if len(at) < MIN_RAIL_SAMPLES:
             continue
@@ -99,9 +104,11 @@ class Saturation(Chain):
         """Find channels with samples at a rail; the axes of a triad share the limit."""
         out = []
         for first in (0, 3):
-            limit, found = float(recording.limits[first // 3]), {}
             # a channel at its rail all the time shows no noise of its own
             noise = float(np.nanmax(recording.noise[first : first + 3], initial=0.0))
+            limit, found = float(recording.limits[first // 3]), {}
+            if np.isnan(limit):
+                limit = _common_rail(recording, first, noise)
             for _ in range(2):
                 for c in range(first, first + 3):
                     if c not in found and len(
@@ -111,7 +118,7 @@ class Saturation(Chain):
                 if not found:
                     break
                 limit = float(max(_size(recording, c, at) for c, at in found.items()))
-            out += [_fault(recording, c, found[c]) for c in sorted(found)]
+            out += [_fault(recording, c, found[c], noise) for c in sorted(found)]
         return out
 
 
@@ -128,16 +135,39 @@ def _at_rails(recording: CheckedSamples, c: int, limit: float, noise: float) -> 
     return np.sort(np.concatenate(out))
 
 
+def _common_rail(recording: CheckedSamples, first: int, noise: float) -> float:
+    """Value at which two axes of a triad stop, each for a while; nan if none do.
+
+    No axis of the triad may go beyond it.
+    """
+    sizes: list[float] = []
+    triad = [recording.channel(c) for c in range(first, first + 3)]
+    largest = float(np.nanmax(np.abs(triad), initial=0.0))
+    for c, values in enumerate(triad, first):
+        own = set[float]()
+        for start, end, step in recording.grids.stretches(c, len(values)):
+            part = values[start:end]
+            if not noise > step or not np.isfinite(part).any():
+                continue
+            for edge in (float(np.nanmin(part)), float(np.nanmax(part))):
+                runs = runs_of_true(part == edge)
+                if len(runs) and np.diff(runs).max() >= MIN_RAIL_SAMPLES:
+                    own.add(abs(edge))
+        sizes += own
+    at_largest = [s for s in sizes if s > 0 and abs(s - largest) <= SAME * largest]
+    return largest if len(at_largest) > 1 else np.nan
+
+
 def _size(recording: CheckedSamples, c: int, rows: Rows) -> float:
     return float(np.abs(recording.channel(c)[rows]).max())
 
 
-def _fault(recording: CheckedSamples, c: int, rows: Rows) -> Fault:
+def _fault(recording: CheckedSamples, c: int, rows: Rows, noise: float) -> Fault:
     limit, t = _size(recording, c, rows), recording.block.t
     return Fault(
         channel=CHANNELS[c],
         values={"channel": CHANNELS[c], "limit": limit},
-        sigmas={"limit": float(recording.noise[c])},
+        sigmas={"limit": noise},
         from_s=float(t[rows[0]]),
         to_s=float(t[rows[-1]]),
         rows=rows,

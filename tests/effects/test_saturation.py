@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.effects.saturation import samples_at_rails
-from fieldcal.physics.recording import lsb_of
+from fieldcal.core.samples import Block
+from fieldcal.effects.saturation import Saturation, samples_at_rails
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.recording import CheckedSamples, Grids, lsb_of
 
 STEP = 1e-3
 
@@ -85,3 +87,41 @@ def test_what_stands_still_on_the_way_up_is_at_no_stop() -> None:
     values[top - 30 : top + 60] = values[top - 30]
     assert values.max() == values[top]
     assert not samples_at_rails(values, np.nan)
+
+
+def leaning(limit: float, steps: float = 1e-4, dead: bool = False) -> CheckedSamples:
+    """A device of which y is up all the time, and x in its last position."""
+    rng = np.random.default_rng(4)
+    n = 3000
+    angle = np.interp(np.arange(n), [0, 900, 1000, 1900, 2000], [0, 0, 0.6, 0.6, 0.75])
+    force = 9.8 * np.column_stack([np.sin(angle), -np.cos(angle) - 0.3, 0 * angle])
+    noise = np.array([0.01, 0.01, 0.01])
+    acc = np.clip(force + rng.normal(0, noise, (n, 3)), -limit, limit)
+    acc = np.round(acc / steps) * steps
+    if dead:
+        acc[:, 1:] = 0.0
+    gyr = rng.normal(0, 1e-3, (n, 3))
+    nowhere = np.full(1, np.nan)
+    return CheckedSamples(
+        Block.of(np.arange(n) / 50.0, acc, gyr), np.array([[0, 900]]),
+        Experience.at_rest(nowhere, nowhere, 9.8), np.ones(6), np.zeros(6),
+        np.array([0.01, 0.0, 0.01, *[1e-3] * 3]), np.full(6, 0.01), np.full(6, steps),
+        Grids(np.zeros(1, np.intp), np.array([[steps] * 3 + [0.0] * 3])),
+        np.full(2, np.nan), 50.0,
+    )  # fmt: skip
+
+
+def test_two_axes_that_stop_at_one_value_are_at_their_full_scale() -> None:
+    """Neither comes out of it before the recording ends."""
+    found = {f.channel: f for f in Saturation().find(leaning(6.5))}
+    assert set(found) == {"ax", "ay"}
+    for fault in found.values():
+        assert fault.values["limit"] == pytest.approx(6.5)
+        assert fault.sigmas["limit"] == 0.01
+    assert len(found["ay"].rows) == 3000 and 900 < len(found["ax"].rows) < 1100
+
+
+def test_one_axis_alone_may_be_stuck_there() -> None:
+    assert not Saturation().find(leaning(9.0))
+    assert not Saturation().find(leaning(6.5, steps=0.1)), "any value is taken again"
+    assert not Saturation().find(leaning(9.0, dead=True)), "two that are never sent"

@@ -150,9 +150,7 @@ def chain(name: str, rng: np.random.Generator) -> Session:
         "noise_level": {"channel": channel, "ratio": float(rng.uniform(2.5, 6))},
         "mounting": {"axes": str(rng.choice(axes))},
         "smoothing": dict.fromkeys(("acc", "gyr"), float(rng.uniform(0.15, 1.5))),
-        "high_pass": dict.fromkeys(
-            ("ax", "ay", "az"), float(10 ** rng.uniform(-5.5, -3))
-        ),
+        "high_pass": {"acc": float(10 ** rng.uniform(-5.5, -3))},
     }  # fmt: skip
     host = effects.kind(name).EXAMPLE.host_clock
     session = replace(session, label=name, host_clock=host)

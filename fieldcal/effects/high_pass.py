@@ -2,18 +2,20 @@
 
     U' = u' - U / tau,    U = u - (1 / tau) (integral of U since the start)          (1)
 
-u output without it and U with it, device axes; 1 / tau in 1/s, of each output. The
-second form is the first one integrated, and holds for any tau: what is recorded is U
-itself, and what it was before the start is a constant that counts as bias. So a bias
-means nothing once such a device has moved on: it follows what was measured. Source: a
+u output without it and U with it, device axes; 1 / tau in 1/s, one of a sensor's three
+outputs. The second form is the first one integrated, and holds for any tau: what is
+recorded is U itself, and what it was before the start is a constant that counts as
+bias. So a bias means nothing once such a device has moved on: it follows what was
+measured. As U is of the outputs, it needs no scale factor to be known. Source: a
 setting of accelerometers for tilt that changes or for shocks; the driver of the ADXL355
 in Zephyr lists corners of 24.7e-4 to 0.0238e-4 times the output rate, which is 0.5 to
 2100 s at 31 to 125 Hz.
 
 >>> import numpy as np
 >>> x = Experience.at_rest(np.zeros(1), np.zeros(1), 9.8, passed=np.full((1, 6), 3.0))
->>> HighPass().design(x)[0].diagonal()
-array([-3., -3., -3., -3., -3., -3.])
+>>> HighPass().design(x)[0].T + 0.0
+array([[-3., -3., -3.,  0.,  0.,  0.],
+       [ 0.,  0.,  0., -3., -3., -3.]])
 """
 
 from __future__ import annotations
@@ -22,16 +24,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.core.samples import Array
-from fieldcal.physics.effect import NO_SHAPE, Sensor, six
+from fieldcal.core.samples import ACC, GYR, Array
+from fieldcal.physics.effect import NO_SHAPE, Param, Sensor
 from fieldcal.physics.experience import Experience
 
 
 class HighPass(Sensor):
-    """Corner of each output, as 1 / tau."""
+    """Corners of the accelerometers and of the gyroscopes, as 1 / tau."""
 
-    of_inputs = True
-    params = six("1/s", 1e-3, "1/s", 1e-3)
+    params = (Param("acc", "1/s", 1e-3), Param("gyr", "1/s", 1e-3))
     covariate = "integral of the output"
     seen_in = "time"
     absent = "at the start"
@@ -64,6 +65,7 @@ class HighPass(Sensor):
         return 1e-3
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """Minus the integral of each output."""
-        out: Array = -x.passed[:, :, None] * np.eye(6)  # (1)
+        """Minus the integral of each output, by the corner of its sensor."""
+        out = np.zeros((len(x), 6, 2))
+        out[:, ACC, 0], out[:, GYR, 1] = -x.passed[:, ACC], -x.passed[:, GYR]  # (1)
         return out

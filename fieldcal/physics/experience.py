@@ -49,8 +49,8 @@ class Experience:
     f_dot, f_bend : (n, 3) m/s^3 and m/s^4, first and second derivative of f, of its
         components in device axes; 0 where they are not known
     w_bend : (n, 3) rad/s^3, second derivative of w; 0 where that is not known
-    passed : (n, 6) m/s and rad, integral of the outputs since the start, over their
-        nominal scale factors; 0 where that is not known
+    passed : (n, 6) m/s and rad, integral of the outputs since the start, over the
+        nominal outputs per SI unit of their sensor; 0 where that is not known
     t : (n,) s, device time
     lasts : (n,) s, what each row is a mean over; 0 for samples
     since_start : (n,) s since the session's start

@@ -2,8 +2,8 @@
 
     y_n = (y_(n-1) + x_n - x_(n-1)) exp(-r interval)
 
-x outputs before it and y behind it; r, 1/s, one over the time constant. The first
-sample is as it was.
+x outputs before it and y behind it; r, 1/s, one over the time constant, of the
+accelerometers and of the gyroscopes. The first sample is as it was.
 """
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ import numpy as np
 from scipy.signal import lfilter
 
 from fieldcal.core.samples import Array
-from fieldcal.sim_device.effect import SIX, Example, SimulatedEffect, Stage
+from fieldcal.sim_device.effect import Example, SimulatedEffect, Stage
 
 
 class SimulatedHighPass(SimulatedEffect):
-    """Corner of each output, as one over its time constant."""
+    """Corner of each triad, as one over its time constant."""
 
-    VECTOR = SIX
-    EXAMPLE = Example({"ax": 2e-3, "ay": 2e-3, "az": 2e-3})
+    VECTOR = ("acc", "gyr")
+    EXAMPLE = Example({"acc": 2e-3})
 
     def stage(self, full_scale: Array) -> Stage:
         """Filtered, from the first sample on."""
         last: dict[int, tuple[float, float, float]] = {}
 
         def filtered(t: Array, x: Array) -> None:
-            for row, name in enumerate(SIX):
-                if not (rate := self[name]):
+            for row, rate in enumerate(np.repeat([self["acc"], self["gyr"]], 3)):
+                if not rate:
                     continue
                 begins = row not in last
                 before, came, sent = last.get(

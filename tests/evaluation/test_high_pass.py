@@ -51,11 +51,10 @@ def test_it_is_named_and_refused(tmp_path: Path, tau: float) -> None:
     session = recorded(tmp_path / "s", tau)
     found = diagnose(session.block, session.about)
     (effect,) = (e for e in found.effects if e.id == "high_pass")
-    for axis in ("ax", "ay", "az"):
-        told = effect.parameters.get(axis)
-        if told is not None:
-            assert abs(float(told.value) - 1 / tau) < 4 * float(told.sigma or 0), axis
-    assert float(effect.parameters["ay"].sigma or 1) < 0.05 / tau
+    told = effect.parameters["acc"]
+    assert set(effect.parameters) == {"acc"}
+    assert abs(float(told.value) - 1 / tau) < 4 * float(told.sigma or 0)
+    assert float(told.sigma or 1) < 0.04 / tau
     assert {e.id for e in found.effects} <= {"high_pass", "earth_rate"}
     made = solve_prepared(PreparedSession(session, usable_windows(session)))
     assert not made.good

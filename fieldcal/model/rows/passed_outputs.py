@@ -2,8 +2,9 @@
 
     X(t) = integral of y(s) / k ds from the first sample to t                       (1)
 
-y output and k its nominal scale factor. Outputs that are missing keep the last known
-value.
+y output and k the nominal size of one of its sensor, outputs per SI unit: the same of
+three axes, as y is what a filter has, whatever their scale factors are. Outputs that
+are missing keep the last known value.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class PassedOutputs:
 
     @classmethod
     def of(cls, block: Block, nominal: Mapping[str, Any]) -> Self:
-        """Integrate the outputs of a recording with nominal scale factors."""
+        """Integrate the outputs of a recording with nominal scale factors, (3,)."""
         t = block.t
         rate = (len(t) - 1) / max(float(np.ptp(t)), 1e-9) if len(t) > 1 else 1.0
         step = max(int(rate * resolutions.INTEGRAL_STEP_S), 1)
@@ -44,8 +45,8 @@ class PassedOutputs:
         values = np.zeros((len(kept), 6))
         for c, y in enumerate((*block.acc.T, *block.gyr.T)):
             values[:, c] = running_integral(t, _last_known(y))[kept]  # (1)
-        scale = np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]])
-        return cls(t[kept], values / scale)
+        first = [nominal[name][0] for name in ("acc_scale", "gyr_scale")]
+        return cls(t[kept], values / np.abs(np.repeat(first, 3)))
 
     def at(self, t: Array) -> Array:
         """The integral at instants (n,), (n, 6)."""

@@ -43,7 +43,8 @@ class GroupBesideEffect:
     ----------
     values, covariance : (k,), (k, k) without the effect, m/s^2, rad/s or 1
     slope : (k, m) B of (1), by the typical sizes of the effect
-    wander : (k, k) covariance that the effect, if it is random, adds by itself
+    wander : (k, k) what the effect adds to the covariance: a random one by itself; any
+        other takes away the instability that stands for it where it is left out
     typical : (k,) typical sizes
 
     """
@@ -136,6 +137,7 @@ def _apart(ours: GroupBesideEffect, theirs: GroupBesideEffect) -> GroupBesideEff
         values=ours.values - theirs.values,
         covariance=ours.covariance + theirs.covariance,
         slope=ours.slope - theirs.slope,
+        wander=ours.wander + theirs.wander,
     )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from fieldcal.against.motion.held import count_positions, what_is_held
+from fieldcal.against.motion.held import count_attitudes, count_positions, what_is_held
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
@@ -75,6 +75,7 @@ def open_simulator_output(
         _check_same_is_held(path, (read.block, read.about), real)
         return read.block, read.about, list(read.says)
     about = _description_of_simulated(path, read.block, read.rests, *real)
+    _check_it_turns(path, (read.block, about), real)
     return read.block, about, list(read.says)
 
 
@@ -88,11 +89,30 @@ def _check_same_is_held(
     theirs, ours = what_is_held(*sim), what_is_held(*real)
     if theirs == ours or ours == "motion":
         return
-    count, wanted = count_positions(*sim), count_positions(*real)
-    raise InputError(
-        f"{path}: shows {count} position{'s' * (count != 1)}, and the recording"
-        f" {wanted}: let the simulator hold the positions of the recording"
+    raise _holds_others(path, count_positions(*sim), count_positions(*real))
+
+
+def _check_it_turns(
+    path: Path, sim: tuple[Block, Description], real: tuple[Block, Description]
+) -> None:
+    """Refuse a file of a device that stayed as it was while the recorded one turned.
+
+    It rests at all times of the recording, and so seems to follow its schedule.
+    """
+    count, wanted = count_attitudes(*sim), count_attitudes(*real)
+    if count == 1 < wanted:
+        raise _holds_others(path, count, wanted)
+
+
+def _holds_others(path: Path, count: int, wanted: int) -> InputError:
+    return InputError(
+        f"{path}: shows {_positions(count)}, and the recording {wanted}: let the"
+        " simulator hold the positions of the recording"
     )
+
+
+def _positions(count: int) -> str:
+    return f"{count} position{'s' * (count != 1)}"
 
 
 def read_output(path: Path) -> SimulatorOutput:
@@ -157,10 +177,10 @@ def _description_of_simulated(
     if len(rests) == len(ours) == len(about.windows):
         return replace(about, windows=tuple(rests), excluded_spans=())
     raise InputError(
-        f"{path}: the simulated device rests {len(rests)} times and not at the times of"
-        f" the recording, which has {len(ours)} positions: let the simulator hold the"
-        " same positions in the same order, or import the file and write its positions"
-        " into session.toml"
+        f"{path}: the simulated device rests {len(rests)} time{'s' * (len(rests) != 1)}"
+        f" and not at the times of the recording, which has {_positions(len(ours))}:"
+        " let the simulator hold the same positions in the same order, or import the"
+        " file and write its positions into session.toml"
     )
 
 

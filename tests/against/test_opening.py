@@ -124,6 +124,25 @@ def test_a_session_of_fewer_positions_is_refused(tmp_path: Path, folder: Path) -
         open_simulator_output(folder, (resting.block, resting.about))
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_file_of_a_device_that_never_turns_is_refused(
+    tmp_path: Path, folder: Path, stated: bool
+) -> None:
+    """It rests at all times of the recording, so that its times tell nothing."""
+    session = Session.open(folder)
+    positions = tuple(
+        p if stated else replace(p, alpha=None, beta=None) for p in session.positions
+    )
+    rest = strapdown.outputs(NOISE)
+    place = strapdown.schedule()[0]
+    held = rest[(rest[:, 0] > place["start_s"]) & (rest[:, 0] < place["end_s"])]
+    rest[:, 1:] = held[np.arange(len(rest)) % len(held), 1:]
+    path = write_csv(tmp_path / "still.csv", rest)
+    real = (session.block, replace(session.about, positions=positions))
+    with pytest.raises(InputError, match=r"still.csv: shows 1 position, and the rec"):
+        open_simulator_output(path, real)
+
+
 def test_two_devices_at_rest_are_compared(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

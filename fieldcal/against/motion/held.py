@@ -38,11 +38,15 @@ def what_is_held(block: Block, about: Description) -> Held:
 
 def count_positions(block: Block, about: Description) -> int:
     """Number of different positions that a recording holds."""
-    windows = [w for w in about.windows if w is not None]
     if any(p.alpha is not None or p.rate or p.speed for p in about.positions):
-        return len(windows)
+        return sum(w is not None for w in about.windows)
+    return count_attitudes(block, about)
+
+
+def count_attitudes(block: Block, about: Description) -> int:
+    """Number of directions of the force in the windows, whatever angles are stated."""
     seen: list[Array] = []
-    for start, end in windows:
+    for start, end in (w for w in about.windows if w is not None):
         acc = block.between(start, end).acc
         if not np.isfinite(acc).any(axis=0).all():
             continue

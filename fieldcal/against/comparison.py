@@ -56,7 +56,7 @@ def compare_sides(real: DiagnosedRecording, sim: DiagnosedRecording) -> Match:
     ]
     apart.sort(key=lambda d: -d.probability)
     differences = tuple(d for d in apart if d.probability >= thresholds.DIFFERS)
-    verdict = verdict_of(differences)
+    verdict, possible = verdict_of(differences), apart[len(differences) :]
     predicted = (
         prediction.predict_as_simulated(found),
         prediction.predict_as_explained(real),
@@ -64,7 +64,7 @@ def compare_sides(real: DiagnosedRecording, sim: DiagnosedRecording) -> Match:
     warnings = (
         *_warnings_of(real), *_warnings_of(sim), *_added_noise(sim),
         *_missing_outputs(found),
-        *map(possible_difference, apart[len(differences) :]),
+        *map(possible_difference, possible),
     )  # fmt: skip
     return Match(
         verdict,
@@ -75,7 +75,7 @@ def compare_sides(real: DiagnosedRecording, sim: DiagnosedRecording) -> Match:
         recording_facts(real, found.real),
         recording_facts(sim, found.sim),
         warnings,
-        paragraph(verdict, differences, predicted),
+        paragraph(verdict, differences, predicted, possible=possible),
     )
 
 

@@ -11,6 +11,7 @@ from fieldcal.against.result import (
     SimulatorPrediction,
 )
 from fieldcal.calibration.wording import format_unit
+from fieldcal.core.sentences import join_words
 from fieldcal.diagnosis.result import Quantity, Verdict
 from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
@@ -35,16 +36,17 @@ def paragraph(
     differences: Sequence[Difference],
     predicted: tuple[SimulatorPrediction, SimulatorPrediction],
     parts: str = "Positions",
+    possible: Sequence[Difference] = (),
 ) -> str:
     """Verdict, differences and their effect on the prediction, in sentences.
 
-    `parts` names what was held out: positions or stretches.
+    `parts` names what was held out, positions or stretches; `possible` are differences
+    that are not probable enough to be reported.
     """
     if verdict == "consistent":
         return (
             "Recording and simulator agree: the simulator predicts the recording with"
-            f" χ²/dof {predicted[0].chi2_per_dof:.2f}, and nothing differs that these"
-            " recordings can show."
+            f" χ²/dof {predicted[0].chi2_per_dof:.2f}, and {_nothing_else(possible)}."
         )
     out = []
     for direction, lead in DIRECTION_LEADS.items():
@@ -59,6 +61,17 @@ def paragraph(
             " is there as well is not known."
         )
     return " ".join([*out, _predicted(*predicted, parts)])
+
+
+def _nothing_else(possible: Sequence[Difference]) -> str:
+    perhaps = [
+        f"{one.id.replace('_', ' ')} (P {one.probability:.2f})"
+        for one in possible
+        if one.shown
+    ]
+    if not perhaps:
+        return "nothing differs that these recordings can show"
+    return f"nothing differs for certain, but {join_words(perhaps)} may"
 
 
 def is_direction_open(one: Difference) -> bool:

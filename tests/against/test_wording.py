@@ -56,6 +56,17 @@ def test_what_one_of_the_two_cannot_show_is_not_said_to_differ_perhaps() -> None
     assert "in the output of the recording would show it" in said
 
 
+def test_what_may_differ_is_not_nothing() -> None:
+    predicted = SimulatorPrediction(1.0, 1.0, 1.0), SimulatorPrediction(1.0, 1.0, 1.0)
+    perhaps = replace(bump(12.0, 1.0), probability=0.77)
+    said = paragraph("consistent", [], predicted, possible=[perhaps])
+    assert said.endswith("nothing differs for certain, but bump (P 0.77) may.")
+    hidden = replace(perhaps, shown=False)
+    for open_ones in ([], [hidden]):
+        said = paragraph("consistent", [], predicted, possible=open_ones)
+        assert said.endswith("nothing differs that these recordings can show.")
+
+
 @pytest.mark.parametrize(
     ("direction", "expected"),
     [

@@ -163,11 +163,18 @@ def _average_windows(
         taken[i] = found.no_better_than(least)
         if remark:
             warnings.append(f"{_position_label(session, i)}: {remark}")
-    for i, missing in _incomplete(taken, about).items():
+    incomplete = _incomplete(taken, about)
+    for i, missing in incomplete.items():
         del taken[i]
         warnings.append(
             f"{_position_label(session, i)} is left out: its window has no"
             f" {join_words(missing)}, which others have; take it again"
+        )
+    if incomplete and not taken:
+        lacking = dict.fromkeys(map(join_words, incomplete.values()))
+        warnings.append(
+            f"each lacks a channel that another has ({' or '.join(lacking)}): record"
+            " all channels together"
         )
     return taken
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from session_folders import CALM, FACES, places, recorded, write_session
 
+from fieldcal.core.errors import SessionError
 from fieldcal.evaluation.observations import observe
 from fieldcal.evaluation.usable_windows import usable_windows
 from fieldcal.session.folder import Session
@@ -36,3 +37,18 @@ def test_one_is_left_out_by_name_and_the_others_are_solved(
     none = replace(block, acc=six[:, :3], gyr=six[:, 3:])
     session = Session.open(write_session(tmp_path / "n", none, held))
     assert usable_windows(session).position_numbers == tuple(range(6))
+
+
+def test_sensors_that_no_window_shows_together_are_said_so(tmp_path: Path) -> None:
+    """The last window's want was told of all, as if others had what it lacks."""
+    held = places(FACES, 4.0, 4.0)
+    block = recorded(CALM, held)
+    six, middle = block.six.copy(), held[3]["start_s"] - 2
+    six[block.t < middle, 3:] = six[block.t >= middle, :3] = np.nan
+    some = replace(block, acc=six[:, :3], gyr=six[:, 3:])
+    session = Session.open(write_session(tmp_path / "s", some, held))
+    with pytest.raises(SessionError) as refused:
+        usable_windows(session)
+    said = str(refused.value)
+    assert f"none of the {len(held)} windows can be used; each lacks a channel" in said
+    assert "(gx, gy and gz or ax, ay and az): record all channels together" in said

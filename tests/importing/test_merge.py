@@ -277,3 +277,42 @@ def test_files_in_different_units_are_not_one_recording(
     assert main(call) == 0
     length = np.linalg.norm(Session.open(tmp_path / "out").block.acc, axis=1)
     assert 9.0 < length.min() and length.max() < 10.8
+
+
+def test_a_recording_that_is_named_twice_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its samples would count twice; the copy may have another name and clock."""
+    first, other = faces(tmp_path, 0.0)[:2]
+    copy = write(tmp_path, face(0, 77.0), "copy.csv", HEADING)
+    out = tmp_path / "out"
+    call = ["import", first, other, str(copy), "--in-order", "-o", str(out)]
+    assert main(call) == 2
+    said = capsys.readouterr().err
+    assert "copy.csv: holds the samples of side_0.csv: name each recording once" in said
+    assert not out.exists()
+
+
+def test_files_without_noise_may_begin_alike(tmp_path: Path) -> None:
+    """A simulator holds the first position again at the end, without any noise."""
+    rows = np.concatenate([face(i, 0.0)[:1] for i in (0, 1, 2, 0)]).repeat(ROWS, axis=0)
+    rows[:, 0] = np.tile(np.arange(ROWS) / HZ, 4)
+    files = [
+        str(write(tmp_path, part, f"{i}.csv", HEADING))
+        for i, part in enumerate(np.split(rows, 4))
+    ]
+    assert len(brought(tmp_path, files).block) == len(rows)
+
+
+def test_files_of_one_sensor_each_are_not_one_after_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows, out = face(0, 0.4), tmp_path / "out"
+    files = [
+        str(stamped(tmp_path / f"{name}.csv", rows, [0, *columns]))
+        for name, columns in (("gyr", [4, 5, 6]), ("acc", [1, 2, 3]))
+    ]
+    assert main(["import", *files, "--in-order", "-o", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert "acc.csv: holds accelerometers alone, and gyr.csv gyroscopes alone" in said
+    assert "with --join" in said and not out.exists()

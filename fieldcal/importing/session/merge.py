@@ -8,15 +8,20 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Block, concat
+from fieldcal.core.samples import ACC, GYR, Array, Block, concat
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.clock_text import DAY
 from fieldcal.importing.times.row_validator import RowValidator
 
 BETWEEN = 10.0
 """Time taken to have passed between two files of which no clock tells, s."""
+
+COMPARED, MIN_DISTINCT = 200, 20
+"""Rows at the beginning of files that are compared, and how many of them must differ:
+a device at rest whose output has no noise begins every file alike."""
 
 AS_NAMED = (
     f"that of the files as they are named, {BETWEEN:g} s apart, since their times start"
@@ -103,6 +108,7 @@ class FilesInOrder(SeveralFiles):
     def __init__(self, parts: Sequence[Recording]) -> None:
         super().__init__(parts)
         self._rows: list[int] = []
+        self._begun: list[Array] = []
         count_from_one_day(parts)
         for part in parts:
             # only their own zeros tell whether one clock ran through them all
@@ -122,8 +128,20 @@ class FilesInOrder(SeveralFiles):
 
         Times of a file that do not go on behind those of the file before begin anew,
         and are taken to follow after a pause.
+
+        Raises
+        ------
+        InputError
+            If two files begin with the same samples, or one holds accelerometers alone
+            and another gyroscopes alone.
+
         """
-        yield from self._in_order(p.blocks(stream_name(p)) for p in self._parts)
+        measured = np.zeros((len(self._parts), 6), dtype=bool)
+        for block in self._in_order(p.blocks(stream_name(p)) for p in self._parts):
+            at = len(self._rows)
+            measured[at] |= np.isfinite(block.six).any(axis=0)
+            yield block
+        self._refuse_one_sensor_each(measured)
         self._tell(self.parts)
 
     def first_rows(self, stream: str, most: int) -> Block:
@@ -133,18 +151,45 @@ class FilesInOrder(SeveralFiles):
         return concat(list(self._in_order(flows)))
 
     def _in_order(self, flows: Iterable[Iterable[Block]]) -> Iterator[Block]:
-        self._rows, last, shift = [], np.nan, 0.0
+        self._rows, self._begun, last, shift = [], [], np.nan, 0.0
         for flow in flows:
             rows, begun = 0, False
             for block in flow:
                 known = block.t[np.isfinite(block.t)]
                 if len(known) and not begun:
+                    self._refuse_again(block.six[:COMPARED])
                     begun, shift = True, self._shift(float(known[0]), last, shift)
                 block = replace(block, t=block.t + shift)
                 last = float(np.fmax(last, np.max(known + shift, initial=-np.inf)))
                 rows += len(block)
                 yield block
             self._rows.append(rows)
+
+    def _refuse_again(self, six: Array) -> None:
+        """Refuse a file that begins as one before it, whatever its times are."""
+        for part, before in zip(self._parts, self._begun, strict=False):
+            n = min(len(six), len(before))
+            same = np.array_equal(six[:n], before[:n], equal_nan=True)
+            if same and len(np.unique(six[:n], axis=0)) >= MIN_DISTINCT:
+                again = self._parts[len(self._begun)].path
+                raise InputError(
+                    f"{again}: holds the samples of {part.path.name}: name each"
+                    " recording once, as samples that count twice make a result look"
+                    " surer than it is"
+                )
+        self._begun.append(six)
+
+    def _refuse_one_sensor_each(self, measured: NDArray[np.bool_]) -> None:
+        """Refuse files of one motion, of which each has one of the sensors."""
+        acc, gyr = measured[:, ACC].any(axis=1), measured[:, GYR].any(axis=1)
+        if (acc & gyr).any() or not (acc.any() and gyr.any()):
+            return
+        one, other = (self._parts[int(np.argmax(has))].path for has in (acc, gyr))
+        raise InputError(
+            f"{one}: holds accelerometers alone, and {other.name} gyroscopes alone:"
+            " --in-order is for files recorded one after another; join those that hold"
+            " the sensors of one IMU with --join"
+        )
 
     def _shift(self, begins: float, last: float, before: float) -> float:
         """What is added to the times of a file that begins so, s.

@@ -192,13 +192,15 @@ def noise_result(
     Raises
     ------
     InputError
-        If the sessions are of several devices or rates, or not long enough at rest.
+        If the sessions are of several devices or rates, turned, or not long enough at
+        rest.
 
     """
     from fieldcal.calibration import limits as bounds
     from fieldcal.noise import estimate_noise, reduce_recording
     from fieldcal.noise.alignment import gyrocompass_heading
     from fieldcal.noise.document import NoiseResult
+    from fieldcal.noise.rest_check import refuse_turned
 
     _check_one_device(sessions)
     about = sessions[0].about
@@ -206,6 +208,8 @@ def noise_result(
     allowed = bounds.read(grade, limits)
     names = names or [str(s.folder) for s in sessions]
     reduced = [reduce_recording(_blocks_at_rest(s)) for s in sessions]
+    for name, recording in zip(names, reduced, strict=True):
+        refuse_turned(recording, name)
     model = estimate_noise(reduced, names)
     serial = str(about.device.get("serial", ""))
     recalibrate, since = _recalibration_times(model, allowed, serial, history)

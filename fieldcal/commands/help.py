@@ -107,7 +107,9 @@ class CommandParser(argparse.ArgumentParser):
             Always.
 
         """
-        told = re.search(r"invalid (?:float|int) value: '(-?\d+),(\d+)'$", message)
+        message = re.sub(r"invalid float value: (.*)$", r"\1 is no number", message)
+        message = re.sub(r"invalid int value: (.*)$", r"\1 is no whole number", message)
+        told = re.search(r"'(-?\d+),(\d+)' is no ", message)
         point = f", write {told[1]}.{told[2]}" if told else ""
         raise InputError(f"{message}{point}; see {self.prog} --help")
 

@@ -114,7 +114,7 @@ def read_plan(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it is no TOML file.
+        If it cannot be read, or is no TOML file.
 
     """
     try:
@@ -124,7 +124,14 @@ def read_plan(path: Path) -> dict[str, Any]:
         raise InputError(
             f"{path}: is neither a procedure ({known}) nor a plan file"
         ) from error
-    except (OSError, ValueError) as error:
+    except IsADirectoryError as error:
+        raise InputError(
+            f"{path}: is a folder, no plan file; an interrupted run goes on with"
+            f" fieldcal run --resume {path}"
+        ) from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
         raise InputError(f"{path}: is no plan file: {error}") from error
 
 

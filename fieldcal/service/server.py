@@ -104,8 +104,10 @@ def read_tokens(path: Path) -> list[str]:
     try:
         lines = path.read_text("utf-8").splitlines()
         mode = path.stat().st_mode
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is no text, and no file of tokens") from error
     if os.name == "posix" and mode & 0o077:
         raise InputError(f"{path}: others may read the tokens: chmod 600 {path}")
     found = [one for line in lines if (one := line.split("#")[0].strip())]

@@ -27,9 +27,12 @@ def read_noise(path: Path) -> Mapping[str, Any] | None:
         content = load_json(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise SessionError(f"{file}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
         raise SessionError(
-            f"{file}: cannot be read: {error}; run fieldcal noise again"
+            f"{file}: is no {NOISE}: {error}; name the folder of a session that has"
+            " one, or run fieldcal noise again"
         ) from error
     if not isinstance(content, dict):
         raise SessionError(f"{file}: holds no JSON object; run fieldcal noise again")

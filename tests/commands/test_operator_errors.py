@@ -144,7 +144,31 @@ def test_what_was_typed_wrong_is_one_sentence_and_one_object(
     assert "write 50.45; see fieldcal run --help" in err and err.count("\n") == 1
     assert json.loads(out)["exit_code"] == 2
     assert main(["run", "--latitude", "north"]) == 2
-    assert "'north'; see fieldcal run --help" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "--latitude: 'north' is no number; see fieldcal run --help" in said
+    assert main(["plan", "--positions", "5.5"]) == 2
+    said = capsys.readouterr().err
+    assert "--positions: '5.5' is no whole number; see fieldcal plan --help" in said
+
+
+def test_a_session_named_as_a_plan_goes_on_with_resume(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert f"{tmp_path}: is a folder, no plan file" in said
+    assert f"fieldcal run --resume {tmp_path}" in said and "Errno" not in said
+
+
+def test_a_recording_is_no_noise_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "rest.csv"
+    log.write_text("t,ax,ay,az\n0,0,0,9.8\n")
+    assert main(["plan", "--positions", "5", "--noise-of", str(log)]) == 2
+    said = capsys.readouterr().err
+    assert "rest.csv: is no noise.json" in said
+    assert "name the folder of a session that has one" in said
 
 
 @contextmanager

@@ -382,6 +382,11 @@ def test_tokens_are_secret_and_long(tmp_path: Path) -> None:
         path.write_text(wrong)
         with pytest.raises(InputError, match="one token of 16 letters"):
             read_tokens(path)
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="t: is no text, and no file of tokens"):
+        read_tokens(path)
+    with pytest.raises(InputError, match="none: cannot be read: No such file or dir"):
+        read_tokens(tmp_path / "none")
 
 
 def zipped(folder: Path) -> bytes:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from fieldcal.calibration import Calibration
     from fieldcal.core.samples import Block
+    from fieldcal.session.folder import Session
 
 EXAMPLE = """\
   fieldcal apply bench-7/2026-03-01 calibrated.csv
@@ -43,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
     session = Session.open(args.session)
     calibration = read_calibration(args.calibration or args.session)
+    _check_same_device(args, calibration, session)
     check_same_installed(calibration, session)
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
     known = len(session.warnings)
@@ -59,6 +61,28 @@ def run(args: argparse.Namespace) -> int:
     _write_samples(args.out, block)
     sys.stdout.write(f"written: {args.out}, {len(block)} samples, m/s^2 and rad/s\n")
     return 0
+
+
+def _check_same_device(
+    args: argparse.Namespace, calibration: Calibration, session: Session
+) -> None:
+    """Refuse a calibration of another device; without serial numbers nobody knows.
+
+    Raises
+    ------
+    InputError
+        Naming both.
+
+    """
+    from fieldcal.core.errors import InputError
+
+    devices = calibration.info.get("device", {}), session.about.device
+    theirs, ours = (str(d.get("serial", "")).strip() for d in devices)
+    if theirs and ours and theirs != ours:
+        raise InputError(
+            f"{args.calibration or args.session}: is a calibration of device {theirs},"
+            f" and {args.session} was recorded with {ours}: name one of this device"
+        )
 
 
 def _nominal_parameters(calibration: Calibration, block: Block) -> list[str]:

@@ -75,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
     history = History(args.history or default_location())
     if args.serial is None:
+        _check_no_device_is_wanted(args)
         return _list_devices(args, history)
     if args.accept is not None:
         history.accept(args.serial, args.accept)
@@ -89,6 +90,18 @@ def run(args: argparse.Namespace) -> int:
     if args.compare:
         return _compare_runs(args, runs)
     return _show_trends(args, runs)
+
+
+def _check_no_device_is_wanted(args: argparse.Namespace) -> None:
+    """Refuse options that are about one device, where none is named."""
+    from fieldcal.core.errors import InputError
+
+    for name in ("parameter", "compare", "accept", "png"):
+        if getattr(args, name) not in (None, [], ()):
+            raise InputError(
+                f"--{name} is about one device: name it, as in fieldcal history A1B2"
+                f" --{name} …; fieldcal history alone lists them"
+            )
 
 
 def _list_devices(args: argparse.Namespace, history: History) -> int:

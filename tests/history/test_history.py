@@ -320,6 +320,10 @@ def test_the_command_lists_plots_compares_and_accepts(
     assert document["parameters"]["acc_bias.x"][2]["out_of_family"]
     for wrong in (["B2"], ["A1", "--parameter", "x"], ["A1", "--compare", "1", "9"]):
         assert main(["history", *wrong, *own]) == 2
+    capsys.readouterr()
+    assert main(["history", "--compare", "1", "3", *own]) == 2
+    shown = capsys.readouterr()
+    assert "--compare is about one device: name it" in shown.err and not shown.out
 
 
 def test_the_report_shows_what_the_history_of_the_device_has(

@@ -95,7 +95,8 @@ def _session_folders(paths: list[Path]) -> list[Path]:
     found = list({path.resolve(): path for path in found}.values())
     if len(found) < len(("one", "other")):
         raise InputError(
-            f"{' '.join(map(str, paths))}: holds {len(found)} sessions; name the folder"
+            f"{' '.join(map(str, paths))}: holds"
+            f" {len(found) or 'no'} session{'s' * (len(found) != 1)}; name the folder"
             " that fieldcal import wrote for a log of several IMUs, or its sessions"
         )
     return found

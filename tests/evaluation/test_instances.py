@@ -96,4 +96,4 @@ def test_folders_of_the_same_name_are_different_imus(
     assert [one["name"] for one in found] == [str(path) for path in paths]
     same = paths[0].parent / ".." / "a" / "imu0"
     assert main([*call, str(paths[0]), str(same)]) == 2
-    assert "holds 1 sessions" in capsys.readouterr().out
+    assert "holds 1 session;" in capsys.readouterr().out

@@ -59,3 +59,12 @@ def test_what_has_nothing_else_or_is_far_behind_is_no_rival() -> None:
 def test_of_the_same_causes_the_likelier_is_the_rival() -> None:
     found = explanation(({"cubic"}, 1.0), ({"cubic"}, 3.0))
     assert found.rivals == (Rival(frozenset({"cubic"}), 99.0),)
+
+
+def test_a_rival_far_ahead_leaves_nothing_to_another() -> None:
+    """As of two recordings that have the very same noise."""
+    with np.errstate(over="raise", invalid="raise"):
+        first, _ = explanation(
+            ({"flexible_mount", "time_delay"}, -900.0), ({"cubic", "time_delay"}, 5.0)
+        ).probable_causes()
+    assert first.aliases == ("flexible_mount",) and first.probability == 0.9

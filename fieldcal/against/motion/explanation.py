@@ -89,12 +89,13 @@ class MotionExplanation:
         """
         without = [r for r in self.rivals if cause.name not in r.names]
         near = [r for r in without if self._behind(r) < thresholds.ALIAS_LOG_MARGIN]
-        weight = sum(np.exp(-self._behind(r)) for r in self.rivals)
-        taken = sum(np.exp(-self._behind(r)) for r in without if r not in near)
+        ahead = np.array([0.0, *(-self._behind(r) for r in self.rivals)])
+        shares = np.exp(ahead - np.logaddexp.reduce(ahead))[1:]
+        apart = [r in without and r not in near for r in self.rivals]
         added = sorted(frozenset().union(*(r.names for r in near)) - self.names)
         return replace(
             cause,
-            probability=cause.probability * float(1 - taken / (1 + weight)),
+            probability=cause.probability * float(1 - shares[apart].sum()),
             aliases=tuple(dict.fromkeys((*cause.aliases, *added))),
         )
 

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.last_known import last_known
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index
 from fieldcal.model.causes.basis import General, RowView
 from fieldcal.model.causes.cause import Group
@@ -99,7 +100,7 @@ class UndoneSmoothing:
         # loading it takes 0.1 s, and few recordings are smoothed
         from scipy.signal import lfilter
 
-        t, six = self.block.t, _last_known(self.block.six)
+        t, six = self.block.t, last_known(self.block.six)
         for a, b in self.windows.tolist():
             if b > a:
                 six[a:b] = six[a:b].mean(axis=0)
@@ -112,14 +113,6 @@ class UndoneSmoothing:
                     [1 - share], [1, -share], six[:, triad], axis=0, zi=begin
                 )
         return SmoothedOutputs(t, six)
-
-
-def _last_known(six: Array) -> Array:
-    """Outputs (n, 6) of which a missing one keeps the value of the previous sample."""
-    at = np.where(np.isfinite(six), np.arange(len(six))[:, None], 0)
-    last = np.maximum.accumulate(at, axis=0)
-    out: Array = np.nan_to_num(np.take_along_axis(six, last, axis=0))
-    return out
 
 
 @dataclass(frozen=True, eq=False)

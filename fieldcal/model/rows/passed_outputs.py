@@ -15,6 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from fieldcal.core.last_known import last_known
 from fieldcal.core.running_integral import running_integral
 from fieldcal.core.samples import Array, Block
 from fieldcal.model import resolutions
@@ -44,7 +45,7 @@ class PassedOutputs:
         kept = np.append(np.arange(0, len(t), step), len(t) - 1)
         values = np.zeros((len(kept), 6))
         for c, y in enumerate((*block.acc.T, *block.gyr.T)):
-            values[:, c] = running_integral(t, _last_known(y))[kept]  # (1)
+            values[:, c] = running_integral(t, last_known(y))[kept]  # (1)
         first = [nominal[name][0] for name in ("acc_scale", "gyr_scale")]
         return cls(t[kept], values / np.abs(np.repeat(first, 3)))
 
@@ -56,12 +57,3 @@ class PassedOutputs:
         """Mean over rows about t that last (n,) s at rest, (n, 6)."""
         out: Array = (self.at(t - lasts / 2) + self.at(t + lasts / 2)) / 2
         return out
-
-
-def _last_known(y: Array) -> Array:
-    """An output (n,) of which a missing value is the one before it, or 0."""
-    known = np.isfinite(y)
-    if known.all():
-        return y
-    at = np.maximum.accumulate(np.where(known, np.arange(len(y)), 0))
-    return np.nan_to_num(y[at])

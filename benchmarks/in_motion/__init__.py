@@ -1,7 +1,7 @@
 """Recordings in motion, held against a simulator that follows the motion.
 
     python -m benchmarks in_motion [PAIRS] [--seed=N] [--lag=S] [--jitter=S]
-        [--seconds=S] [--hz=F]
+        [--seconds=S] [--hz=F] [--noise=K]
 
 A motion program of its own draws bodies that are swung, and IMUs on them with clocks,
 axes, biases and scale factors of their own, noise of every colour, and in turn nothing
@@ -13,7 +13,8 @@ numbers scatter in their own standard deviations, and how stretches that were le
 are predicted, and what processor time a comparison takes. `--lag` puts a low-pass of
 that time constant on the gyroscopes of all others besides, and `--jitter` makes the
 stamps of samples be off by so much, one sigma. `--seconds` and `--hz` are length and
-rate of other recordings.
+rate of other recordings. `--noise` gives the reference white noise, K times that of the
+devices, and all bodies a motion of all frequencies, the weaker, the quicker it is.
 """
 
 from __future__ import annotations
@@ -31,10 +32,11 @@ def main() -> None:
     count, seed = how_many(USUAL), int(option("seed", str(SEED)))
     lag, jitter = float(option("lag", "0")), float(option("jitter", "0"))
     length, hz = float(option("seconds", str(SECONDS))), float(option("hz", str(HZ)))
+    noise = float(option("noise", "0"))
     off: list[float] = []
     ahead, named, false, spent = [], 0, 0, []
     for number in range(count):
-        one, found, took = compared(number, seed, lag, jitter, length, hz)
+        one, found, took = compared(number, seed, lag, jitter, length, hz, noise)
         spent.append(took)
         usual = set(CALIBRATION)
         usual |= {"bandwidth"} if lag and one.kind != "bandwidth" else set()

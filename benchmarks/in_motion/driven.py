@@ -62,6 +62,18 @@ class Drive:
         return (self.axes(t) @ world[:, :, None])[:, :, 0]
 
 
+class Shaken(Drive):
+    """A motion of all frequencies up to 24 Hz, the weaker, the quicker it is."""
+
+    def __init__(self, seed: int, waves: int = 250) -> None:
+        rng = np.random.default_rng(seed)
+        self.hz = np.exp(rng.uniform(np.log(0.1), np.log(24.0), (6, waves)))
+        place, angle = 0.16 * self.hz[:3] ** -3.2, 0.25 * self.hz[3:] ** -2.2
+        size = np.concatenate([place, angle]) * rng.uniform(0.5, 1.5, (6, waves))
+        phase = np.exp(2j * np.pi * rng.random((6, waves)))
+        self.sine = size / np.sqrt(waves) * phase
+
+
 def low_passed(drive: Drive, t: Any, arm: Any, tau: float, gyro: bool) -> Any:
     """A channel triad after a first-order low-pass: Simpson's rule over its past."""
     ages = np.linspace(0.0, 16.0, 65)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.in_motion.driven import Drive, recorded
+from benchmarks.in_motion.driven import Drive, Shaken, recorded
 from fieldcal.against import Match
 from fieldcal.against.motion import compare_in_motion
 from fieldcal.against.result import RealAndSimulated
@@ -140,17 +140,23 @@ def compared(
     jitter: float = 0.0,
     seconds: float = SECONDS,
     hz: float = HZ,
+    noise: float = 0.0,
 ) -> tuple[Drawn, Match, float]:
     """A drawn device held against the motion that it went through.
+
+    With `noise` the reference has white noise of its own, in that of the device, and
+    the motion has all frequencies.
 
     Returns
     -------
     What was drawn, what was found, and the processor time that it took, s.
 
     """
-    one, drive = drawn(number, seed, lag, jitter, hz), Drive(seed + number)
+    one = drawn(number, seed, lag, jitter, hz)
+    drive = Shaken(seed + number) if noise else Drive(seed + number)
     real = block_of(recorded(drive, one.device, seconds, hz))
-    sim = block_of(recorded(drive, {}, seconds + 20, hz))
+    own = {"noise": {"white": noise * WHITE}, "seed": seed + 2000 + number}
+    sim = block_of(recorded(drive, own, seconds + 20, hz))
     start = time.process_time()
     found = compare_in_motion((real, ABOUT), sim, ("recording", "simulator"))
     return one, found, time.process_time() - start

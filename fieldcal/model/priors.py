@@ -133,6 +133,10 @@ UPRIGHT, UNSEEN = 10.0, np.repeat([0.5, 0.01], 3)
 """Possible offset of a channel that the reference does not measure: gravity along the
 upright axis, and three degrees of it along the level axes."""
 
+REFERENCE_NOISE_CHANCE = 0.5
+"""Probability that a triad of a reference has noise of its own: a better sensor has,
+and simulators may."""
+
 SMALL_ROTATION = 1.0
 """Prior standard deviation of the rotations of an unknown orientation, rad: any."""
 

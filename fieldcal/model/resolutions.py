@@ -132,6 +132,10 @@ BAND_RATIO, MIN_BAND_COEFFICIENTS = 1.25, 5
 """Of the ends of a band of noise, and coefficients of one at least, whose power is then
 known to 60 %."""
 
+POWER_PIECE_S, POWER_REACH = 5.0, 2
+"""Length of the pieces that give the power of a motion, s, and frequencies to each side
+over which it is averaged at least: a piece's window spreads a line over as many."""
+
 CENTRE_EVERY = 10
 """Samples of the first window of which one is looked at for what is subtracted from
 all, to keep the rounding of their sums small: any number near their mean does."""

@@ -27,6 +27,10 @@ has four digits, and what is calculated nine."""
 MIN_POWER = ROUNDING**2
 """Power below which a channel repeats its reference, in its unit squared."""
 
+AXIS_POWER_SHARE = 1e-6
+"""Least power on an axis, as a part of that on all three, for an inverse: noise of such
+a size takes nothing from a motion that shows."""
+
 NO_WEIGHT_NOISE = 1e5
 """Factor on the noise of a row that must not count: a weight of 1e-10, which no row
 shows, and the covariance can still be inverted."""

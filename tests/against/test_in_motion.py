@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -422,3 +423,15 @@ def test_a_command_is_patched_until_it_moves_as_the_recording(
     patch = json.loads((folder / "patch.json").read_text())
     assert patch["effects"]["bandwidth"]["gyr"] == pytest.approx(0.02, abs=1e-3)
     assert patch["effects"]["lever_arm"]["x"] == pytest.approx(0.2, abs=2e-3)
+
+
+def test_noise_of_the_reference_is_no_filter_of_the_device() -> None:
+    """Quick motion below that noise looks as if it had gone through a low-pass."""
+    one, found, _ = compared(0, 5000, seconds=60.0, hz=50.0, noise=8.0)
+    assert not one.kind
+    assert {d.id for d in found.differences} <= CALIBRATION
+    (said,) = (w for w in found.warnings if "accelerometers have noise" in w)
+    density, sigma = re.findall(r"([\d.]+) ± ([\d.]+) m/s\^2/sqrt\(Hz\)", said)[0]
+    off = float(density) - 8 * WHITE[0] / 50**0.5
+    assert abs(off) < 4 * float(sigma)
+    assert float(sigma) < 0.1 * float(density)

@@ -20,6 +20,7 @@ from fieldcal.against.motion.free_calibration import (
     determined_calibration,
     free_calibration_sizes,
 )
+from fieldcal.against.motion.noise_of_reference import noise_densities
 from fieldcal.against.motion.placed import alignment_result, axes_difference
 from fieldcal.against.motion.proof import predict_motion
 from fieldcal.against.motion.shown_effects import effect_differences
@@ -154,3 +155,8 @@ def _warnings(found: MotionExplanation, names: tuple[str, str]) -> Iterator[str]
     for name, triad in (("accelerometers", ACC), ("gyroscopes", GYR)):
         if not reference.observed[triad].any():
             yield f"{names[1]}: has no {name}, so they are not compared"
+    yield from (
+        f"{names[1]}: its {name} have noise of their own, {density}, beside which they"
+        " do not show quick motion: let the simulator write its motion without noise"
+        for name, density in noise_densities(found)
+    )

@@ -153,7 +153,7 @@ def _likely_starts(fit: MotionFit, dictionary: MotionDictionary) -> list[_Start]
     it explains nothing beside the one just tried.
     """
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
-    delays = tuple(m for m in every if lag_of(m).delay)
+    delays = tuple(m for m in every if lag_of(m).delay or m[0].kind == "noise")
     fit.settle(delays)
     tried = [_Start(fit, delays, nothing := fit.evidence(delays))]
     explains = {

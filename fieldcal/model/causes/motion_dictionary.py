@@ -15,13 +15,16 @@ import numpy as np
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model import priors
 from fieldcal.model.causes.basis import General, RowView
-from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import effect_causes
 from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.physics.effect import Motion
+
+REFERENCE_NOISE = "reference_noise"
+"""Cause that a reference has noise of its own."""
 
 
 class CurrentAlignment:
@@ -31,6 +34,7 @@ class CurrentAlignment:
     ----------
     rows : rows at that alignment
     change : (n, 6) time derivatives of force, m/s^3, and rate, rad/s^2
+    hidden : (n, 6) what noise of the reference hides of them
 
     """
 
@@ -43,6 +47,7 @@ class CurrentAlignment:
         self.change = rows.motion(rows.gyr, 1)
         if rows.gyr is not rows.acc:
             self.change[:, ACC] = rows.motion(rows.acc, 1)[:, ACC]
+        self.hidden = rows.hidden()
 
 
 class MotionDictionary(Dictionary):
@@ -127,7 +132,27 @@ class MotionDictionary(Dictionary):
             effect = cause.variants[0].effect
             if not isinstance(effect, Motion) or effect.on_the_way:
                 yield cause
+        yield from self._reference_noise()
         yield from unknown_causes(self)
+
+    def _reference_noise(self) -> Iterator[Cause]:
+        """What noise of the reference hides of the motion, by triad."""
+        current = self.current
+
+        def hidden(view: RowView) -> Array:
+            out = np.zeros((*current.hidden.shape, 2))
+            for i, triad in enumerate((ACC, GYR)):
+                out[:, triad, i] = -view.state.scale[triad] * current.hidden[:, triad]
+            return out
+
+        at = self.add(General(REFERENCE_NOISE, hidden), 2)
+        for i, (part, channels) in enumerate(TRIADS):
+            if self.used[:, channels].any():
+                group = Group(REFERENCE_NOISE, part, at[i : i + 1], np.ones(1))
+                yield Cause(
+                    REFERENCE_NOISE, part, priors.REFERENCE_NOISE_CHANCE, (group,),
+                    "noise",
+                )  # fmt: skip
 
     def _unoriented_earth(self) -> Iterator[Group]:
         """None: the reference contains the Earth's rate if it measures it."""

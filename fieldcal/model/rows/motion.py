@@ -32,6 +32,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index, Mask
 from fieldcal.model import detections, resolutions, tolerances
 from fieldcal.model.rows.reference import Reference
+from fieldcal.model.rows.reference_noise import ReferenceNoise
 from fieldcal.model.rows.response import Response
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
@@ -79,6 +80,7 @@ class MotionRows:
     length : rows of each stretch
     step : s from row to row
     reference : of the motion
+    noise : that the reference may have
     alignment : beside it
     acc, gyr : what each triad makes of the motion, as far as that is known
     share : of `uneven` that is known to be the stamps' error
@@ -94,6 +96,7 @@ class MotionRows:
     length: int
     step: float
     reference: Reference
+    noise: ReferenceNoise
     alignment: Alignment
     acc: Response
     gyr: Response
@@ -153,6 +156,14 @@ class MotionRows:
                 [self.alignment.unseen_gravity[p] @ self._turn for p in TRIADS]
             )
         return values
+
+    def hidden(self) -> Array:
+        """What noise of the reference hides of the motion in each output, (n, 6)."""
+        both = [
+            self._means_of(response.follow(self.noise.hidden), response.late, 0)
+            for response in self._responses
+        ]
+        return np.hstack([both[0][:, ACC], both[-1][:, GYR]])
 
     def experience(self, response: Response) -> Experience:
         """The same as the inputs of effects."""
@@ -286,17 +297,20 @@ def rows_in_motion(
     warming, heating = thermometer.at(block.t[at].mean(axis=1))
     if not thermometer.changes:
         warming = np.full(len(at), np.nan)  # its noise is no change
+    noise = ReferenceNoise.of(reference)
     stamps, uneven = block.t[at], _stamp_errors(block.t, stretches).reshape(at.shape)
     taken = stamps
     between = step * per_row / resolutions.KNOTS_PER_ROW
     if not uneven.any() and reference.step <= between:
         lasts = step * (1 + alignment.drift)  # by the clock of the reference, (1)
-        reference = reference.averaged_over(lasts * _centred(per_row), between)
+        offsets = lasts * _centred(per_row)
+        reference = reference.averaged_over(offsets, between)
+        noise = replace(noise, hidden=noise.hidden.averaged_over(offsets, between))
         taken, uneven = stamps.mean(axis=1, keepdims=True), np.zeros((len(at), 1))
     ideal = Response.of(reference)
     return MotionRows(
         stamps, taken, uneven, six[at].mean(axis=1), warming, heating, length,
-        step * per_row, reference, alignment, ideal, ideal,
+        step * per_row, reference, noise, alignment, ideal, ideal,
     )  # fmt: skip
 
 

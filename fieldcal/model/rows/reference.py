@@ -69,8 +69,14 @@ class Reference:
 
     def filtered_by(self, sensor: Callable[[PPoly], PPoly]) -> Self:
         """The reference after a filter is applied to each spline."""
+        return self.with_splines(
+            [(channels, sensor(spline)) for channels, spline in self.splines]
+        )
+
+    def with_splines(self, splines: list[tuple[Index, PPoly]]) -> Self:
+        """The same instants with other splines of the channels."""
         out = copy(self)
-        out.splines = [(channels, sensor(spline)) for channels, spline in self.splines]
+        out.splines = splines
         return out
 
     def select_channels(self, channels: Collection[int]) -> Self:

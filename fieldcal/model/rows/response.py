@@ -71,11 +71,7 @@ class Response:
         channels: range = SIX,
     ) -> Self:
         """Response to a reference with a delay and time constants."""
-        sensed = reference
-        if tau:
-            sensed = sensed.filtered_by(partial(first_order, tau=tau))
-        if second:
-            sensed = sensed.filtered_by(partial(second_order, tau=second))
+        sensed = low_passed(reference, tau, second)
         slope = partial(
             first_order_slope, tau=max(abs(tau), detections.MIN_TIME_CONSTANT_S)
         )
@@ -87,6 +83,10 @@ class Response:
             late, tau, second, sensed, own.filtered_by(slope), own.filtered_by(bend),
             channels,
         )  # fmt: skip
+
+    def follow(self, reference: Reference) -> Reference:
+        """Another reference after the low-passes."""
+        return low_passed(reference, self.tau, self.second)
 
     def step_towards(
         self,
@@ -132,3 +132,12 @@ class Response:
             abs(self.tau - other.tau) / detections.MIN_TIME_CONSTANT_S,
             abs(self.second - other.second) / detections.MIN_SECOND_ORDER_S,
         )
+
+
+def low_passed(reference: Reference, tau: float, second: float) -> Reference:
+    """A reference after low-passes of first and second order, if there are any."""
+    if tau:
+        reference = reference.filtered_by(partial(first_order, tau=tau))
+    if second:
+        reference = reference.filtered_by(partial(second_order, tau=second))
+    return reference

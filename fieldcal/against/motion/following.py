@@ -27,12 +27,8 @@ from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.rows.coloured_noise import Bands
-from fieldcal.model.rows.motion import (
-    Alignment,
-    MotionRows,
-    common_samples,
-    rows_in_motion,
-)
+from fieldcal.model.rows.motion import Alignment, MotionRows
+from fieldcal.model.rows.motion_reduction import common_samples, rows_in_motion
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.state import State

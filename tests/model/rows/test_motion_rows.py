@@ -9,13 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.motion import (
-    Alignment,
-    MotionRows,
-    common_samples,
-    frequencies,
-    rows_in_motion,
-)
+from fieldcal.model.rows.motion import Alignment, MotionRows, frequencies
+from fieldcal.model.rows.motion_reduction import common_samples, rows_in_motion
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.rows.response import Response
 from fieldcal.physics.experience import Experience

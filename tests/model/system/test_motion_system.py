@@ -16,7 +16,8 @@ from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.eliminated import Eliminated
 from fieldcal.model.evidence.gram import WeightedGram
 from fieldcal.model.rows.coloured_noise import Bands
-from fieldcal.model.rows.motion import Alignment, MotionRows, rows_in_motion
+from fieldcal.model.rows.motion import Alignment, MotionRows
+from fieldcal.model.rows.motion_reduction import rows_in_motion
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.rows.response import Response
 from fieldcal.model.state import State, Term

@@ -132,6 +132,14 @@ BAND_RATIO, MIN_BAND_COEFFICIENTS = 1.25, 5
 """Of the ends of a band of noise, and coefficients of one at least, whose power is then
 known to 60 %."""
 
+KNOTS_HZ = 200.0
+"""Least knots a second of a reference: a spline through them keeps all but 3e-4 of the
+25 Hz that rows show at most."""
+
+SERIES_REACH, SERIES_WINDOW = 48, ("kaiser", 14.0)
+"""Samples to each side that such knots are made of, and their window: up to 0.45 of the
+samples' rate a wave is kept to 1e-6."""
+
 POWER_PIECE_S, POWER_REACH = 5.0, 2
 """Length of the pieces that give the power of a motion, s, and frequencies to each side
 over which it is averaged at least: a piece's window spreads a line over as many."""

@@ -27,6 +27,10 @@ has four digits, and what is calculated nine."""
 MIN_POWER = ROUNDING**2
 """Power below which a channel repeats its reference, in its unit squared."""
 
+UNEVEN_SHARE = 1e-3
+"""Largest distance of stamps from even ones, in their interval, that is taken for
+rounding: a microsecond, at up to 1 kHz."""
+
 AXIS_POWER_SHARE = 1e-6
 """Least power on an axis, as a part of that on all three, for an inverse: noise of such
 a size takes nothing from a motion that shows."""

@@ -12,11 +12,11 @@ from copy import copy
 from typing import Self
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import PPoly
 
 from fieldcal.core.samples import Array, Block, Index, Mask
 from fieldcal.model import detections
-from fieldcal.model.rows.knots import even_times, hermite_spline
+from fieldcal.model.rows.knots import even_times, hermite_spline, spline_through
 
 
 class Reference:
@@ -42,7 +42,7 @@ class Reference:
         self.t, self.step = block.t[whole], float(np.median(np.diff(block.t[whole])))
         self.start, self.end = float(self.t[0]), float(self.t[-1])
         self.splines: list[tuple[Index, PPoly]] = [
-            (channels, CubicSpline(block.t[known], six[np.ix_(known, channels)]))
+            (channels, spline_through(block.t[known], six[np.ix_(known, channels)]))
             for known, channels in self._by_missing_samples(np.isfinite(six))
         ]
 

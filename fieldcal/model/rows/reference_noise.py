@@ -19,11 +19,11 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from scipy.signal import oaconvolve
 
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model import resolutions, tolerances
+from fieldcal.model.rows.knots import odd_extension, spline_through
 from fieldcal.model.rows.reference import Reference
 
 Powers = NDArray[np.complex128]
@@ -60,7 +60,7 @@ class ReferenceNoise:
             variance[i] = np.linalg.eigvalsh(power).min()
             share = variance[i] * np.linalg.inv(power)
             splines.append(
-                (observed, CubicSpline(reference.t, _filtered(some, share, length)))
+                (observed, spline_through(reference.t, _filtered(some, share, length)))
             )
         return cls(reference.with_splines(splines), variance, reference.step)
 
@@ -100,8 +100,7 @@ def _filtered(z: Array, share: Powers, length: int) -> Array:
     """Channels (n, m) after a filter with a response, (f, m, m)."""
     kernel = np.fft.fftshift(np.fft.irfft(share, length, axis=0), axes=0)
     after, before = length // 2, length - 1 - length // 2
-    ends = [2 * z[0] - z[before:0:-1], z, 2 * z[-1] - z[-2 : -2 - after : -1]]
-    every = np.concatenate(ends)
+    every = odd_extension(z, before, after)
     out = [
         sum(oaconvolve(every[:, j], kernel[:, i, j], "valid") for j in range(len(k)))
         for i, k in enumerate(kernel.transpose(1, 2, 0))

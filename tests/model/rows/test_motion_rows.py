@@ -143,8 +143,8 @@ def test_the_bend_is_the_second_derivative_in_the_axes_of_the_device() -> None:
     there = rows(Alignment(0.3, 0.0, 0.0, turn), per_row=1)
     expected = -((0.7 + 0.1 * np.arange(6)) ** 2) * course(there.middles - 0.3)
     found = there.experience(there.acc)
-    np.testing.assert_allclose(found.f_bend, expected[:, :3] @ turn.T, atol=1e-3)
-    np.testing.assert_allclose(found.w_bend, expected[:, 3:] @ turn.T, atol=1e-3)
+    np.testing.assert_allclose(found.f_bend, expected[:, :3] @ turn.T, atol=5e-3)
+    np.testing.assert_allclose(found.w_bend, expected[:, 3:] @ turn.T, atol=5e-3)
     between = np.diff(found.f, axis=0) / np.diff(there.middles)[:, None]
     np.testing.assert_allclose((found.f_dot[1:] + found.f_dot[:-1]) / 2, between,
                                atol=1e-2)  # fmt: skip

@@ -131,7 +131,7 @@ def test_columns_of_the_alignment_are_what_another_one_changes(j: int) -> None:
     d = system_of(rows()).dictionary
     index = [d.clock, d.clock + 1, d.turn, d.turn + 1, d.turn + 2][j]
     # what drifts is taken in the middle of each row of two samples
-    step, apart = 1e-4, 3e-3 if j == 1 else 5e-4
+    step, apart = 1e-4, 4e-3 if j == 1 else 5e-4
     one = step * np.eye(5)[j]
     sides = [
         replace(turned(s * one[2:]), delay=0.3 + s * one[0], drift=1e-3 + s * one[1])

@@ -170,13 +170,13 @@ def _discard_if_empty(folder: Path, further: int) -> bool:
     which have no window without the first one.
     """
     from fieldcal.run.companions import companion_folders
-    from fieldcal.session.arrow_stream import end_of_whole_batches
+    from fieldcal.session.arrow_stream import decode_stream
     from fieldcal.session.folder import DESCRIPTION
     from fieldcal.session.marks import MARKS
     from fieldcal.session.recorder import SAMPLES
 
     with contextlib.suppress(OSError):
-        if end_of_whole_batches((folder / SAMPLES).read_bytes()):
+        if decode_stream((folder / SAMPLES).read_bytes()).end:
             return False
         for each in (*companion_folders(folder, further), folder):
             for name in (SAMPLES, MARKS, DESCRIPTION):

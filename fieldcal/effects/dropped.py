@@ -48,6 +48,7 @@ def _is_pause(recording: CheckedSamples) -> NDArray[np.bool_]:
     """Whether the recording paused after each sample but the last, (n - 1,).
 
     A long time outside windows is a pause, and so is all the time between two windows.
+    So is what is damaged in the file: it says nothing of the link.
     """
     still = recording.still
     starts = np.zeros(len(still), dtype=bool)
@@ -57,6 +58,9 @@ def _is_pause(recording: CheckedSamples) -> NDArray[np.bool_]:
     paused: NDArray[np.bool_] = all_of_it | (
         outside & (np.diff(recording.block.t) > PAUSE_S)
     )
+    t = recording.block.t
+    for start, end in recording.without:
+        paused |= (t[:-1] >= np.nextafter(start, -np.inf)) & (t[1:] <= end)
     return paused
 
 

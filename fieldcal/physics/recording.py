@@ -83,6 +83,8 @@ class CheckedSamples:
     grids : grids of stretches of the recording
     limits : (2,) full scale of accelerometers and gyroscopes, SI; nan where unknown
     rate_hz : nominal rate; nan where unknown
+    without : (start, end) of time of which no sample is known to have been lost on its
+        way: what a disturbance spoiled, or what is damaged in the file, s
 
     """
 
@@ -97,6 +99,7 @@ class CheckedSamples:
     grids: Grids
     limits: Array
     rate_hz: float
+    without: tuple[tuple[float, float], ...] = ()
 
     @property
     def still(self) -> NDArray[np.bool_]:

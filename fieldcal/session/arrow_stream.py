@@ -11,12 +11,16 @@ from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fieldcal.session.arrow_encoder import batch_checksum
+from fieldcal.session.stream_damage import (
+    MARKER,
+    StreamDamage,
+    cut_off,
+    lost_at_end,
+    lost_between,
+)
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-MARKER = b"\xff\xff\xff\xff"
-"""First bytes of every message of a stream; messages begin at multiples of 8 bytes."""
 
 BATCH_KEYS = {"crc32", "number", "row"}
 """Metadata of each batch; a stream of another program has none of these."""
@@ -35,6 +39,8 @@ class StreamContent(NamedTuple):
     faults : one sentence for each fault, without the file's name
     checked : whether every batch had a checksum
     number, row : number and first row of the batch that would follow
+    end : byte behind the last whole batch, intact or not; 0 if there is none
+    breaks : number of intact rows in front of each damaged place between two of them
 
     """
 
@@ -44,6 +50,8 @@ class StreamContent(NamedTuple):
     checked: bool
     number: int
     row: int
+    end: int
+    breaks: tuple[int, ...]
 
 
 def batches_before_damage(source: Any) -> Generator[pa.RecordBatch, None, bool]:
@@ -77,22 +85,6 @@ def batches_before_damage(source: Any) -> Generator[pa.RecordBatch, None, bool]:
         return False
 
 
-def end_of_whole_batches(data: bytes) -> int:
-    """Number of bytes up to the end of the last whole batch; 0 if there is none.
-
-    A closed stream has a marker after that.
-    """
-    import pyarrow as pa
-
-    source, end, batches = pa.BufferReader(data), 0, 0
-    try:
-        while True:
-            batches += pa.ipc.read_message(source).type == "record batch"
-            end = int(source.tell())
-    except (pa.ArrowException, EOFError, OSError):
-        return end if batches else 0
-
-
 def decode_stream(data: bytes, usual: pa.Schema | None = None) -> StreamContent:
     """Read the intact batches of a stream.
 
@@ -124,21 +116,28 @@ class _Decoder:
         self._batches: list[Any] = []
         self._faults_found: list[str] = []
         self._expected, self._row, self._checked = 0, 0, True
+        self._end, self._rows = 0, 0
+        self._breaks: list[int] = []
+        self._damage: StreamDamage | None = None
 
     def run(self) -> StreamContent:
         at = self._read_head()
         if self._schema is not None:
             self._read_all(at)
+        number, row = self._expected, self._row
         if not self._checked:
-            self._expected = len(self._batches)
-            self._row = sum(batch.num_rows for batch in self._batches)
+            number, row = len(self._batches), self._rows
+        elif self._damage is not None:
+            number, row = number + self._damage.batches, row + self._damage.rows
         return StreamContent(
             self._schema,
             self._batches,
             self._faults_found,
             self._checked,
-            self._expected,
-            self._row,
+            number,
+            row,
+            self._end,
+            tuple(self._breaks),
         )
 
     def _read_head(self) -> int:
@@ -168,26 +167,37 @@ class _Decoder:
         size = len(self._raw)
         while at < size:
             if self._raw[at : at + len(CLOSING_BYTES)] == CLOSING_BYTES:
-                at += len(CLOSING_BYTES)
-                if at < size:
-                    self._faults_found.append(
-                        f"{size - at} bytes behind its end are left out"
-                    )
+                self._close(at + len(CLOSING_BYTES))
                 return
             end = self._message(at)
             if end is None:
-                behind = next(
+                end = next(
                     (c for c in self._candidates(at + 8) if self._whole(c)), None
                 )
-                if behind is None:
+                if end is None:
                     break
-                self._faults_found.append(
-                    f"bytes {at} to {behind} are damaged and left out"
-                )
-                end = behind
+                self._note_damage(at, end)
             at = end
-        rows = sum(batch.num_rows for batch in self._batches)
-        self._faults_found.append(f"was cut off; its {rows} whole rows are used")
+        self._faults_found.append(cut_off(self._rows, self._last))
+
+    @property
+    def _last(self) -> Any:
+        """The last intact batch so far; None before the first."""
+        return self._batches[-1] if self._batches else None
+
+    def _close(self, end: int) -> None:
+        """Say what is wrong at the end of a stream that was closed."""
+        if self._damage is not None:
+            self._faults_found.append(lost_at_end(self._row + 1, self._last))
+        if end < len(self._raw):
+            self._faults_found.append(
+                f"{len(self._raw) - end} bytes behind its end are left out"
+            )
+
+    def _note_damage(self, at: int, end: int, batches: int = 0, rows: int = 0) -> None:
+        """Remember that the bytes from `at` to `end` cannot be used."""
+        place = self._damage or StreamDamage(at, at)
+        self._damage = place.extended(end, batches, rows)
 
     def _whole(self, at: int) -> bool:
         """Whether a message that can be read begins at byte `at`."""
@@ -228,13 +238,14 @@ class _Decoder:
             return None
         end, batch, said = found
         if batch is not None:
-            self._take(batch, said)
+            self._take(batch, said, at, end)
+            self._end = end
         return end
 
-    def _take(self, batch: Any, said: dict[str, str]) -> None:
+    def _take(self, batch: Any, said: dict[str, str], at: int, end: int) -> None:
         if not BATCH_KEYS & said.keys() and not self._expected:
             self._checked = False
-            self._batches.append(batch)
+            self._keep(batch, "")
             return
         try:
             number, row = int(said["number"]), int(said["row"])
@@ -242,24 +253,29 @@ class _Decoder:
         except (KeyError, ValueError):
             good, number, row = False, self._expected, self._row
         if not good:
-            self._faults_found.append(
-                f"batch {self._expected + 1}, {batch.num_rows} rows from row "
-                f"{self._row + 1} on, is damaged and left out"
-            )
-            self._expected, self._row = self._expected + 1, self._row + batch.num_rows
+            self._note_damage(at, end, 1, batch.num_rows)
             return
         if number and number < self._expected:
             self._faults_found.append(
                 f"batch {number + 1} is there twice; once is used"
             )
             return
-        if number > self._expected:
-            self._faults_found.append(
-                f"batches {self._expected + 1} to {number} are missing, rows "
-                f"{self._row + 1} to {row}"
-            )
+        lost = f"rows {self._row + 1} to {row}" if number > self._expected else ""
+        self._keep(batch, lost)
         self._expected, self._row = number + 1, row + batch.num_rows
+
+    def _keep(self, batch: Any, lost: str) -> None:
+        """Use an intact batch; `lost` are the rows that are missing in front of it."""
+        place = self._damage
+        if not lost and place is not None:
+            lost = f"bytes {place.first} to {place.end}"
+        if lost:
+            self._faults_found.append(lost_between(lost, self._last, batch))
+            if self._rows:
+                self._breaks.append(self._rows)
+        self._damage = None
         self._batches.append(batch)
+        self._rows += batch.num_rows
 
 
 def _next_batch(stream: Any) -> tuple[Any, dict[str, str]]:

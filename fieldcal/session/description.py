@@ -59,7 +59,7 @@ class Description:
     windows : (start, end) of each position, s of device time; None if not yet known
     position_numbers : index of each position in session.toml, from 0
     excluded_spans : (start, end) of samples that are excluded from the windows that
-        contain them, s, in order
+        contain them, or that are damaged in the file, s, in order
     gaps_without_restart : (last, first) time of the samples around each gap through
         which the device's clock, which begins anew at a restart, went on, s
     smoothing : (2, 2) time constants of a smoothing that was undone in the samples of

@@ -61,7 +61,8 @@ class Session:
     Attributes
     ----------
     folder : path of the folder
-    about : content of session.toml, with positions and windows from marks.jsonl
+    about : content of session.toml, with positions and windows from marks.jsonl, and,
+        once `block` was read, with what is damaged in the samples left out of windows
     warnings : sentences about what was cut off or left out while reading
 
     """
@@ -150,7 +151,11 @@ class Session:
         windows are corrected for that, and `warnings` says so. Samples in disturbances
         that are excluded from windows are nan.
         """
-        raw, cut = sample_files.read_samples(sample_files.find_samples(self.folder))
+        raw, cut, lost = sample_files.read_samples(
+            sample_files.find_samples(self.folder)
+        )
+        without = tuple(sorted((*self.about.excluded_spans, *lost)))
+        self.about = replace(self.about, excluded_spans=without)
         raw, blank = remove_blank_samples(raw)
         if blank:
             cut += (blank_warning(blank),)

@@ -78,7 +78,7 @@ def _samples(folder: Path) -> Iterator[FileFault]:
         yield FileFault("samples", _without(folder, str(error)))
         return
     try:
-        _, says = sample_files.read_samples(path)
+        says = sample_files.read_samples(path).warnings
     except SessionError as error:
         yield FileFault(path.name, _without(path, str(error)))
         return

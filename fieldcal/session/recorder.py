@@ -35,9 +35,10 @@ from fieldcal.session.append_only_file import AppendOnlyFile
 from fieldcal.session.file_writing import write_atomically
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
-from fieldcal.session.marks import MARKS, mark_line
+from fieldcal.session.marks import MARKS, mark_line, read_marks, taken_windows
 from fieldcal.session.sample_files import read_samples
 from fieldcal.session.sample_table import samples_schema, to_record_batch
+from fieldcal.session.stream_damage import no_samples_text
 
 FLUSH_INTERVAL = 0.2
 """Longest time that samples are kept in memory only, s of the host's clock."""
@@ -143,25 +144,43 @@ class Recorder:
         self._encoder = ArrowEncoder(samples_schema())
 
     def _resume(self) -> None:
-        """Cut off an incomplete batch and append after it."""
+        """Cut off an incomplete batch at the end and append after it.
+
+        Raises
+        ------
+        SessionError
+            If samples are there of which none can be read.
+
+        """
         from fieldcal.session.arrow_encoder import ArrowEncoder
-        from fieldcal.session.arrow_stream import decode_stream, end_of_whole_batches
+        from fieldcal.session.arrow_stream import decode_stream
 
         path = self.folder / SAMPLES
         data = path.read_bytes() if path.exists() else b""
-        end = end_of_whole_batches(data)
-        if end:
-            found = decode_stream(data[:end], samples_schema())
+        found = decode_stream(data, samples_schema())
+        if found.batches:
             self._encoder = ArrowEncoder(samples_schema(), found.number, found.row)
-            block = read_samples(path)[0]
+            block = read_samples(path).block
             self._last = (float(block.t[-1]), float(block.t_host[-1]))
             self.link_reopened()
         else:
+            self._refuse_unreadable(path, data)
             self._encoder = ArrowEncoder(samples_schema())
-        self._samples = AppendOnlyFile(path, end)
+        self._samples = AppendOnlyFile(path, found.end)
         marks = self.folder / MARKS
         lines = marks.read_bytes() if marks.exists() else b""
         self._marks = AppendOnlyFile(marks, lines.rfind(b"\n") + 1)
+
+    def _refuse_unreadable(self, path: Path, data: bytes) -> None:
+        """Refuse to write over samples that cannot be read, but could be restored.
+
+        What a run leaves that is killed within its first batch is no such file.
+        """
+        if path.exists() and taken_windows(read_marks(self.folder / MARKS)):
+            raise SessionError(
+                f"{path}: {no_samples_text(data)}; to take all positions of this"
+                " session anew, delete this file first"
+            )
 
     def link_reopened(self) -> None:
         """Note that the link was opened again: the device may have restarted."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Array, Block
 from fieldcal.session.arrow_columns import float_values
 from fieldcal.session.arrow_stream import batches_before_damage, decode_stream
+from fieldcal.session.stream_damage import no_samples_text
 from fieldcal.session.text_files import (
     SAMPLE_COLUMNS,
     iterate_text_batches,
@@ -57,8 +58,25 @@ def find_samples(folder: Path, stem: str = "samples") -> Path:
     )
 
 
-def read_samples(path: Path) -> tuple[Block, tuple[str, ...]]:
-    """Samples of a file, in its own units, and warnings about what was cut off.
+class SamplesFile(NamedTuple):
+    """Content of a samples file.
+
+    Attributes
+    ----------
+    block : its samples, in its own units
+    warnings : sentences about what was cut off or is damaged
+    damaged : (start, end) of each place where samples are lost in the file, s of device
+        time; no sample that is left lies in it
+
+    """
+
+    block: Block
+    warnings: tuple[str, ...]
+    damaged: tuple[tuple[float, float], ...] = ()
+
+
+def read_samples(path: Path) -> SamplesFile:
+    """Samples of a file.
 
     Raises
     ------
@@ -67,14 +85,17 @@ def read_samples(path: Path) -> tuple[Block, tuple[str, ...]]:
 
     """
     try:
-        table, warnings = _table(path)
+        table, warnings, breaks = _table(path)
     except OSError as error:
         raise SessionError(f"{path}: cannot be read: {error}") from error
     columns = {name: _numbers(path, table, name) for name in table.column_names}
     del table  # an hour of samples need not be in memory three times
     _check_columns(path, columns)
     _check_rows(path, columns)
-    return block_from_columns(columns), warnings
+    block = block_from_columns(columns)
+    t = block.t
+    damaged = [(float(np.nextafter(t[i - 1], np.inf)), float(t[i])) for i in breaks]
+    return SamplesFile(block, warnings, tuple(damaged))
 
 
 def iterate_samples(path: Path, says: list[str] | None = None) -> Iterator[Block]:
@@ -109,7 +130,7 @@ def iterate_samples(path: Path, says: list[str] | None = None) -> Iterator[Block
             yield from _parts(block_from_columns(columns))
     except (pa.ArrowException, OSError):
         # raises an error that says what is wrong and where, unless its end is missing
-        whole, warnings = read_samples(path)
+        whole, warnings, _ = read_samples(path)
         says += warnings
         yield from _parts(whole[rows:])
         rows = len(whole)
@@ -159,30 +180,30 @@ def _stream_batches(path: Path, says: list[str]) -> Iterator[pa.RecordBatch]:
             rows += batch.num_rows
             yield batch
     if not finished or not rows:
-        table, warnings = _read_arrows(path)
+        table, warnings, _ = _read_arrows(path)
         says += warnings
         yield from table.slice(rows).to_batches()
 
 
-def _table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
+def _table(path: Path) -> tuple[pa.Table, tuple[str, ...], tuple[int, ...]]:
+    """All rows, warnings, and in front of which rows others are lost."""
     if path.name.endswith(".arrows"):
         return _read_arrows(path)
     if path.name.endswith(".parquet"):
-        return _read_parquet(path), ()
-    return read_text_table(path)
+        return _read_parquet(path), (), ()
+    return *read_text_table(path), ()
 
 
-def _read_arrows(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
+def _read_arrows(path: Path) -> tuple[pa.Table, tuple[str, ...], tuple[int, ...]]:
     import pyarrow as pa
 
     data = path.read_bytes()
     found = decode_stream(data, samples_schema())
-    if found.schema is None:
-        raise SessionError(
-            f"{path}: holds no samples: it was cut off before the first were there"
-        )
+    if found.schema is None or not found.batches:
+        raise SessionError(f"{path}: {no_samples_text(data)}")
     table = pa.Table.from_batches(found.batches, found.schema)
-    return table, tuple(f"{path.name}: {sentence}" for sentence in found.faults)
+    says = tuple(f"{path.name}: {sentence}" for sentence in found.faults)
+    return table, says, found.breaks
 
 
 def _read_parquet(path: Path) -> pa.Table:

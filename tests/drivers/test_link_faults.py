@@ -169,7 +169,7 @@ def test_a_link_that_stumbles_costs_nothing_but_time(
             found = {key: [p[key] for p in parts] for key in ("value", "sigma")}
         pull = np.subtract(found["value"], truth) / np.array(found["sigma"])
         assert np.abs(pull).max() < 4.5, group
-    block, _ = sample_files.read_samples(sample_files.find_samples(run.folder))
+    block, _, _ = sample_files.read_samples(sample_files.find_samples(run.folder))
     assert (np.diff(block.t) > 0).all()
     marks = run.marks("link")
     counts = {

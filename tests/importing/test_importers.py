@@ -648,7 +648,7 @@ def test_changed_bytes_of_an_imported_session_invent_no_sample(
     path = tmp_path_factory.mktemp("changed") / "samples.parquet"
     path.write_bytes(whole)
     try:
-        found, _ = sample_files.read_samples(path)
+        found, _, _ = sample_files.read_samples(path)
     except SessionError as error:
         assert str(error).startswith(f"{path}: ")
         return

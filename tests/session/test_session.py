@@ -88,7 +88,7 @@ def test_every_file_kind_gives_the_same_samples(tmp_path: Path) -> None:
     with Recorder(tmp_path / "d", {"format": 1}) as recorder:
         recorder.append(wanted)
     for name in ("a.csv", "b.csv.gz", "c.parquet", "d/samples.arrows"):
-        got, warnings = sample_files.read_samples(tmp_path / name)
+        got, warnings, _ = sample_files.read_samples(tmp_path / name)
         assert not warnings, name
         np.testing.assert_array_equal(got.six, wanted.six)
         np.testing.assert_array_equal(got.t, wanted.t)
@@ -145,7 +145,7 @@ def test_a_csv_cut_off_anywhere_keeps_its_whole_rows(tmp_path: Path) -> None:
     first_row = text.index("\n", text.index("\n") + 1)
     for end in range(first_row, len(text)):
         (tmp_path / "samples.csv").write_text(text[:end])
-        got, _ = sample_files.read_samples(tmp_path / "samples.csv")
+        got, _, _ = sample_files.read_samples(tmp_path / "samples.csv")
         whole = text[:end].count("\n") - 1
         assert whole <= len(got) <= whole + 1
 
@@ -155,7 +155,7 @@ def test_a_gz_cut_off_is_read_as_far_as_it_goes_and_says_so(tmp_path: Path) -> N
     packed = gzip.compress(f"{HEAD}\n{rows}".encode())
     path = tmp_path / "samples.csv.gz"
     path.write_bytes(packed[: len(packed) // 2])
-    got, warnings = sample_files.read_samples(path)
+    got, warnings, _ = sample_files.read_samples(path)
     assert 100 < len(got) < 5000 and "cut off" in warnings[0]
     path.write_bytes(b"no gzip at all")
     with pytest.raises(SessionError, match="not a gzip file"):
@@ -177,7 +177,7 @@ def test_a_stream_cut_at_any_byte_keeps_every_whole_batch(tmp_path: Path) -> Non
         cut.write_bytes(data[:end])
         whole = sum(end >= size for size in sizes)
         try:
-            got, warnings = sample_files.read_samples(cut)
+            got, warnings, _ = sample_files.read_samples(cut)
         except SessionError as error:
             assert whole == 0 and str(cut) in str(error)
             continue
@@ -390,7 +390,7 @@ def test_samples_keep_no_file_in_memory(tmp_path: Path) -> None:
     path.write_bytes(
         encoder.encode(sample_table.to_record_batch(block)) + encoder.end()
     )
-    read, _ = sample_files.read_samples(path)
+    read, _, _ = sample_files.read_samples(path)
     for column in (read.t, read.seq, read.acc.T, read.gyr.T):
         assert column.flags.c_contiguous
         assert (column if column.base is None else column.base).flags.owndata

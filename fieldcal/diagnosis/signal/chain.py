@@ -294,5 +294,5 @@ def samples_to_check(block: Block, usable: Mask, about: Description) -> CheckedS
         bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
         noise=noise.white, quick=noise.quick, steps=grids_of(block),
         grids=grids_by_stretch(block), limits=np.array(limits),
-        rate_hz=about.rate_hz or np.nan,
+        rate_hz=about.rate_hz or np.nan, without=about.excluded_spans,
     )  # fmt: skip

@@ -293,6 +293,70 @@ def test_a_recording_that_is_named_twice_is_refused(
     assert not out.exists()
 
 
+def overlapping(
+    folder: Path, first: int, begins: float = 3600.0
+) -> tuple[Array, list[str]]:
+    """Rows of one recording, and two files of it, the second from row `first` on."""
+    rows = turned(3, HZ)
+    rows = np.column_stack([begins + np.arange(len(rows)) / HZ, rows[:, 1:]])
+    parts = {"a.csv": rows[:400], "b.csv": rows[first:]}
+    columns = list(range(7))
+    return rows, [str(stamped(folder / n, r, columns)) for n, r in parts.items()]
+
+
+@pytest.mark.parametrize("begins", [0.0, 3600.0, 1714564800.0])
+def test_samples_that_two_files_hold_count_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], begins: float
+) -> None:
+    rows, files = overlapping(tmp_path, 150, begins)
+    out = tmp_path / "out"
+    assert main(["import", *files, "--in-order", "-o", str(out)]) == 0
+    block = Session.open(out).block
+    assert len(block) == len(rows)
+    np.testing.assert_allclose(block.t, rows[:, 0] - begins, atol=1e-6)
+    np.testing.assert_allclose(block.six, rows[:, 1:], atol=1e-6)
+    said = capsys.readouterr().err
+    assert (
+        "b.csv: begins 4.98 s before a.csv ends, and 250 samples are the same" in said
+    )
+    assert "times start anew" not in said
+
+
+def test_files_of_one_time_with_other_samples_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows, files = overlapping(tmp_path, 250)
+    rows[300:, 3] += 1e-3
+    write(tmp_path, rows[250:], "b.csv", HEADING)
+    out = tmp_path / "out"
+    assert main(["import", *files, "--in-order", "-o", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert "b.csv: begins 2.98 s before a.csv ends, and their samples of that" in said
+    assert "cut what overlaps from one of them; or, if the clock began anew" in said
+    assert not out.exists()
+
+
+def test_a_bad_row_behind_an_overlap_is_named_by_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, files = overlapping(tmp_path, 250)
+    lines = Path(files[1]).read_text().splitlines()
+    lines[200] = "3600.1," + lines[200].split(",", 1)[1]
+    Path(files[1]).write_text("\n".join(lines))
+    assert main(["import", *files, "--in-order", "-o", str(tmp_path / "out")]) == 2
+    assert "b.csv, line 201" in capsys.readouterr().err
+
+
+def test_a_clock_that_began_anew_somewhat_later_is_no_overlap(tmp_path: Path) -> None:
+    """Each file counts from its own start of the device, which takes its time."""
+    files = [
+        str(write(tmp_path, face(i, 0.4 + 0.2 * i), f"side_{i}.csv", HEADING))
+        for i in range(6)
+    ]
+    made = brought(tmp_path, files)
+    assert len(made.block) == 6 * ROWS and (np.diff(made.block.t) > 0).all()
+
+
 def test_files_without_noise_may_begin_alike(tmp_path: Path) -> None:
     """A simulator holds the first position again at the end, without any noise."""
     rows = np.concatenate([face(i, 0.0)[:1] for i in (0, 1, 2, 0)]).repeat(ROWS, axis=0)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, GYR, Array, Block, concat
 from fieldcal.importing.recording import ImuStream, Recording
+from fieldcal.importing.session.overlap import Overlap
 from fieldcal.importing.times.clock_text import DAY
 from fieldcal.importing.times.row_validator import RowValidator
 
@@ -108,6 +109,8 @@ class FilesInOrder(SeveralFiles):
     def __init__(self, parts: Sequence[Recording]) -> None:
         super().__init__(parts)
         self._rows: list[int] = []
+        self._shared: list[int] = []
+        self._overlaps: list[Overlap] = []
         self._begun: list[Array] = []
         count_from_one_day(parts)
         for part in parts:
@@ -116,23 +119,28 @@ class FilesInOrder(SeveralFiles):
 
     def place(self, row: int) -> str:
         """Name a sample as its own file does, with the file."""
-        for part, rows in zip(self.parts, self._rows, strict=False):
+        for part, rows, shared in zip(
+            self.parts, self._rows, self._shared, strict=False
+        ):
             if row < rows:
-                return f"{part.path.name}, {part.place(row)}"
+                return f"{part.path.name}, {part.place(row + shared)}"
             row -= rows
         last = self.parts[min(len(self._rows), len(self.parts) - 1)]
-        return f"{last.path.name}, {last.place(row)}"
+        shared = self._shared[-1] if len(self._shared) > len(self._rows) else 0
+        return f"{last.path.name}, {last.place(row + shared)}"
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of one file after the other.
 
-        Times of a file that do not go on behind those of the file before begin anew,
-        and are taken to follow after a pause.
+        Samples that the file before holds as well are used once. Times of a file that
+        do not go on behind those of the file before begin anew, and are taken to follow
+        after a pause.
 
         Raises
         ------
         InputError
-            If two files begin with the same samples, or one holds accelerometers alone
+            If two files begin with the same samples, if a file begins before the end of
+            the one before it with other samples, or if one holds accelerometers alone
             and another gyroscopes alone.
 
         """
@@ -142,6 +150,7 @@ class FilesInOrder(SeveralFiles):
             measured[at] |= np.isfinite(block.six).any(axis=0)
             yield block
         self._refuse_one_sensor_each(measured)
+        self.says += [overlap.sentence() for overlap in self._overlaps]
         self._tell(self.parts)
 
     def first_rows(self, stream: str, most: int) -> Block:
@@ -151,19 +160,49 @@ class FilesInOrder(SeveralFiles):
         return concat(list(self._in_order(flows)))
 
     def _in_order(self, flows: Iterable[Iterable[Block]]) -> Iterator[Block]:
-        self._rows, self._begun, last, shift = [], [], np.nan, 0.0
+        self._rows, self._shared, self._begun, self._overlaps = [], [], [], []
+        last, shift = np.nan, 0.0
         for flow in flows:
-            rows, begun = 0, False
+            rows, begun, overlap = 0, False, None
+            self._shared.append(0)
             for block in flow:
                 known = block.t[np.isfinite(block.t)]
                 if len(known) and not begun:
                     self._refuse_again(block.six[:COMPARED])
-                    begun, shift = True, self._shift(float(known[0]), last, shift)
-                block = replace(block, t=block.t + shift)
+                    begun, overlap = True, self._overlap(block, known[0], last - shift)
+                    if overlap is None:
+                        shift = self._shift(float(known[0]), last, shift)
+                if overlap is not None:
+                    block = overlap.without_shared(block)
+                    self._shared[-1] = overlap.shared
                 last = float(np.fmax(last, np.max(known + shift, initial=-np.inf)))
                 rows += len(block)
-                yield block
+                yield replace(block, t=block.t + shift)
+            if overlap is not None and overlap.shared:
+                self._overlaps.append(overlap)
             self._rows.append(rows)
+
+    def _overlap(self, block: Block, begins: float, ended: float) -> Overlap | None:
+        """What a file that begins so has in common with the one before it.
+
+        None if it begins behind the end of that one, or by a clock that began anew.
+
+        Parameters
+        ----------
+        block : its first samples
+        begins, ended : its first time, and the last one of the file before, s
+
+        """
+        if np.isnan(ended) or begins > ended:
+            return None
+        before, part = self._parts[len(self._shared) - 2 : len(self._shared)]
+        again = before.alone(stream_name(before)).blocks(stream_name(before))
+        overlap = Overlap((before.path.name, str(part.path)), again, begins)
+        if overlap.holds(block):
+            return overlap
+        if overlap.begins_anew:
+            return None
+        raise overlap.refusal()
 
     def _refuse_again(self, six: Array) -> None:
         """Refuse a file that begins as one before it, whatever its times are."""

@@ -195,6 +195,20 @@ class ParameterEstimate:
         return float((x.since_start + x.lasts / 2).max())
 
     @property
+    def changing_causes(self) -> dict[str, float]:
+        """What may change biases or scale factors, noise too, with probabilities."""
+        d, out = self.parameter_set, dict[str, float]()
+        for one in d.explanations:
+            changing = (
+                member[0].name
+                for member in (*one.members, *one.possible_members)
+                if end_values(d, [WeightedExplanation((member,), 1.0)]).bias_scale.any()
+            )
+            for name in dict.fromkeys(changing):
+                out[name] = out.get(name, 0.0) + one.probability
+        return dict(sorted(out.items(), key=lambda item: -item[1]))
+
+    @property
     def bad_probability(self) -> Array:
         """Probability that each window is bad, (n,) in the order of the positions."""
         out = np.zeros(int(self.parameter_set.window_positions.max()) + 1)

@@ -57,7 +57,7 @@ def build_calibration(
     sentences = [
         words.effects_warning(
             estimate.any_cause_probability, estimate.causes, names,
-            estimate.shift_sigmas, estimate.valid_at_s,
+            estimate.shift_sigmas, estimate.valid_at_s, estimate.changing_causes,
         ),
         lot_contribution.sentence if lot_contribution else "",
         *_remarks(method, observations, options, estimate, notes),
@@ -138,7 +138,11 @@ def _carried_info(
         degrees = observations.temperature
         last = float(degrees[-1]) if len(degrees) else np.nan
         warm = last if np.isfinite(last) else None
-        out["as_of"] = {"since_start_s": estimate.valid_at_s, "temperature_degc": warm}
+        out["as_of"] = {
+            "since_start_s": estimate.valid_at_s,
+            "temperature_degc": warm,
+            "because": estimate.changing_causes,
+        }
     return out
 
 

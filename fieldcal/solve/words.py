@@ -31,6 +31,10 @@ SPELLED_DOF = {1: "one degree of freedom", 2: "two degrees of freedom"}
 IN_WORDS = {
     "misset": "a position that was set at another angle",
     "repeated_angle": "an angle that is wrong wherever it is set",
+    "flicker": "flicker noise of the biases",
+    "time": "a course in time that no effect has",
+    "temperature": "a dependence on temperature that no effect has",
+    "force and time": "a scale factor that changes in time as no effect does",
 }
 """Words for causes that are not effects, by id."""
 
@@ -76,6 +80,7 @@ def effects_warning(
     names: Sequence[str],
     moved: Array,
     ended_s: float | None,
+    changing: Mapping[str, float],
 ) -> str:
     """Warning of unrequested effects in a result; empty if they are unlikely.
 
@@ -85,14 +90,13 @@ def effects_warning(
     causes : probability by id of the effect
     names, moved : parameters, and by how many sigmas the effects move each
     ended_s : time for which biases are stated, s since the start; None if constant
+    changing : probability of all that may change biases, noise too, by its id
 
     """
     if sure < thresholds.NAMED:
         return ""
     likely = {i: p for i, p in causes.items() if p >= thresholds.MENTIONED}
-    listed = join_words(
-        [f"{IN_WORDS.get(i, i)} (probability {p:.2f})" for i, p in likely.items()]
-    )
+    listed = _listed(likely)
     if not names:
         return f"the recording shows {listed}; fieldcal diagnose says what to do"
     worst = int(np.abs(moved).argmax())
@@ -100,10 +104,30 @@ def effects_warning(
     if ended_s is not None:
         when = (
             " biases and scale factors are stated for the end of the recording,"
-            f" {ended_s:.0f} s after its start, and"
+            f" {ended_s:.0f} s after its start{_why_at_end(changing, likely)}, and"
         )
     return (
         f"the recording shows {listed}, and the result takes it into account:{when}"
         f" the uncertainties include it; otherwise {names[worst]} would be off by"
         f" {abs(moved[worst]):.1f} σ; fieldcal diagnose says what to do"
     )
+
+
+def _listed(causes: Mapping[str, float]) -> str:
+    """Causes in words with their probabilities."""
+    return join_words(
+        [f"{IN_WORDS.get(i, i)} (probability {p:.2f})" for i, p in causes.items()]
+    )
+
+
+def _why_at_end(changing: Mapping[str, float], likely: Mapping[str, float]) -> str:
+    """What changes biases, as part of a sentence; empty if that is listed already."""
+    seen = bool({*changing} & {*likely})
+    more = {
+        i: p
+        for i, p in changing.items()
+        if i not in likely and (p >= thresholds.MENTIONED or not seen)
+    }
+    if not more:
+        return ""
+    return f", as {_listed(more)} may change them{' too' if seen else ''}"

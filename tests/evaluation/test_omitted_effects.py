@@ -19,7 +19,7 @@ from fieldcal.cli import main
 from fieldcal.core.positions import SIX_FACES
 from fieldcal.evaluation import angle_setting, omitted_effects
 from fieldcal.model.posterior.probabilities import ProbableCause
-from fieldcal.sim_device.profile import Profile
+from fieldcal.sim_device.profile import NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import checked_effect
 from fieldcal.solve import solve
 
@@ -135,6 +135,26 @@ def test_a_drift_is_in_the_result(
     assert any(
         "takes it into account" in w and "end of the recording" in w
         for w in said["warnings"]
+    )
+
+
+def test_flicker_that_moves_the_instant_of_the_biases_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is noise, and no effect that is listed: the reader must see why."""
+    flickers = NoiseFigures(acc_instability=(3e-3,) * 3, gyr_instability=(2e-5,) * 3)
+    bent = checked_effect("quadratic", {"x": 3e-4})
+    profile = replace(CALM, noise=flickers, effects=(*CALM.effects, bent))
+    held = places(WIDE)
+    folder = write_session(tmp_path / "s", recorded(profile, held, 6), held)
+    main(["solve", str(folder), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert "flicker" not in said["carried"]["causes"]
+    assert said["carried"]["as_of"]["because"]["flicker"] > 0.9
+    assert any(
+        "end of the recording, 275 s after its start, as flicker noise of the biases"
+        " (probability 1.00) may change them" in each
+        for each in said["warnings"]
     )
 
 

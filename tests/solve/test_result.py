@@ -43,7 +43,7 @@ def estimated(**known: Any) -> ParameterEstimate:
     )  # fmt: skip
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "undetermined": (), "parameter_set": given,
-        "acc": fit(), "score": -12.5, "valid_at_s": None,
+        "acc": fit(), "score": -12.5, "valid_at_s": None, "changing_causes": {},
         "gyr": fit(rms=np.nan), "closure_squares": (0.0, 0),
         "mixture": SimpleNamespace(
             scatter=np.array([3, 4, 0, 2, 1, 0, 5.0]),
@@ -72,6 +72,7 @@ def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
         "causes": {},
         "shift_sigmas": np.zeros(0),
         "valid_at_s": None,
+        "changing_causes": {},
     }
     vars(none).update(carried | {"values": np.zeros(0), "sigma": np.zeros(0)})
     with pytest.raises(NotObservable) as error:
@@ -96,11 +97,15 @@ def test_what_is_carried_says_when_and_at_which_temperature() -> None:
         "shift_sigmas": np.array([1.5]),
         "causes": {"bias_drift": 0.9},
         "valid_at_s": 300.0,
+        "changing_causes": {"bias_drift": 0.9},
     }
     seen = observed(temperature=np.array([20.0, 21.0, 22.0, 23.0, 24.0]))
     assert result._carried_info(seen, estimated(**known)) == {
         "causes": {"bias_drift": 0.9}, "moved_sigmas": {"acc_bias.x": 1.5},
-        "as_of": {"since_start_s": 300.0, "temperature_degc": 24.0},
+        "as_of": {
+            "since_start_s": 300.0, "temperature_degc": 24.0,
+            "because": {"bias_drift": 0.9},
+        },
     }  # fmt: skip
     unknown = result._carried_info(observed(), estimated(**known))
     assert unknown["as_of"]["temperature_degc"] is None

@@ -117,22 +117,34 @@ def test_effects_that_a_recording_shows() -> None:
         "the recording shows a position that was set at another angle (probability"
         " 0.90) and warm_up (probability 0.10)"
     )
-    assert words.effects_warning(0.49, causes, names, moved, 90.0) == ""
-    assert words.effects_warning(0.5, causes, names, moved, None) == (
+    warm = {"warm_up": 0.1}
+    assert words.effects_warning(0.49, causes, names, moved, 90.0, warm) == ""
+    assert words.effects_warning(0.5, causes, names, moved, None, {}) == (
         f"{shown}, and the result takes it into account: the uncertainties include it;"
         " otherwise acc_bias.y would be off by 2.2 σ; fieldcal diagnose says what to do"
     )
-    assert words.effects_warning(0.5, causes, names, moved, 90.4) == (
+    assert words.effects_warning(0.5, causes, names, moved, 90.4, warm) == (
         f"{shown}, and the result takes it into account: biases and scale factors are"
         " stated for the end of the recording, 90 s after its start, and the"
         " uncertainties include it; otherwise acc_bias.y would be off by 2.2 σ;"
         " fieldcal diagnose says what to do"
     )
-    assert words.effects_warning(1.0, causes, (), np.zeros(0), 90.0) == (
+    noise = {"flicker": 0.23, "random_walk": 0.02}
+    assert words.effects_warning(0.5, causes, names, moved, 90.4, noise) == (
+        f"{shown}, and the result takes it into account: biases and scale factors are"
+        " stated for the end of the recording, 90 s after its start, as flicker noise"
+        " of the biases (probability 0.23) and random_walk (probability 0.02) may"
+        " change them, and the uncertainties include it; otherwise acc_bias.y would be"
+        " off by 2.2 σ; fieldcal diagnose says what to do"
+    )
+    both = words.effects_warning(0.5, causes, names, moved, 90.4, warm | noise)
+    assert "start, as flicker noise of the biases (probability 0.23) may change" in both
+    assert " may change them too, and the uncertainties include it" in both
+    assert words.effects_warning(1.0, causes, (), np.zeros(0), 90.0, warm) == (
         f"{shown}; fieldcal diagnose says what to do"
     )
     assert "an angle that is wrong wherever it is set" in words.effects_warning(
-        1.0, {"repeated_angle": 1.0}, (), np.zeros(0), None
+        1.0, {"repeated_angle": 1.0}, (), np.zeros(0), None, {}
     )
 
 

@@ -124,9 +124,8 @@ def test_two_positions_of_the_same_kind_say_what_a_tilt_would_do() -> None:
 
 
 def test_what_a_recording_shows_is_said_of_one_that_determines_nothing() -> None:
-    said = words.effects_warning(1.0, {"random_walk": 0.97}, (), np.zeros(0), 60.0)
+    walk = {"random_walk": 0.97}
+    said = words.effects_warning(1.0, walk, (), np.zeros(0), 60.0, walk)
     assert said.startswith("the recording shows random_walk (probability 0.97);")
-    of_one = words.effects_warning(
-        1.0, {"random_walk": 0.97}, ("acc_bias.x",), np.ones(1), 60
-    )
+    of_one = words.effects_warning(1.0, walk, ("acc_bias.x",), np.ones(1), 60, walk)
     assert "otherwise acc_bias.x would be off by 1.0 σ" in of_one

@@ -138,6 +138,7 @@ def _diagnose_session(args: argparse.Namespace) -> int:
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare_recording
     from fieldcal.diagnosis.verdict import make_diagnosis
+    from fieldcal.run.untaken import untaken_sentence
     from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
@@ -150,6 +151,8 @@ def _diagnose_session(args: argparse.Namespace) -> int:
             again = _replay_on_twin(args.twin, session, explanation, found)
     if again is not None:
         found = replace(found, says=f"{found.says} {again.says}")
+    if lacking := untaken_sentence(session):
+        found = replace(found, warnings=(*found.warnings, lacking))
     content = found.to_json()
     if again is not None:
         content["twin"] = again.to_json(str(args.twin))

@@ -92,6 +92,8 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.over_time_view import show_over_time
     from fieldcal.commands.progress import SEARCH, show_work
     from fieldcal.commands.table import show_calibration
+    from fieldcal.run.resuming import is_decided
+    from fieldcal.run.untaken import untaken_sentence
     from fieldcal.session.folder import RESULT, Session
 
     session = Session.open(args.session)
@@ -105,7 +107,9 @@ def run(args: argparse.Namespace) -> int:
         show_calibration(found)
         show_lot_prior(found)
         show_over_time(found)
-        show_decision(found)
+        show_decision(found, session.folder if is_decided(session) else None)
+    if lacking := untaken_sentence(session):
+        sys.stderr.write(f"fieldcal solve: {lacking}\n")
     path = keep_result(session, RESULT, found.to_json())
     if not args.json:
         sys.stdout.write(f"written: {path}\n")

@@ -109,10 +109,10 @@ def _planned_count(marks: Sequence[Mapping[str, Any]], session: Session) -> int:
 def is_decided(session: Session) -> bool:
     """Whether the last run of a session came to its result."""
     marks = list(session.marks())
-    return _is_finished(marks) and _has_result(session.folder, marks)
+    return is_finished(marks) and _has_result(session.folder, marks)
 
 
-def _is_finished(marks: Sequence[Mapping[str, Any]]) -> bool:
+def is_finished(marks: Sequence[Mapping[str, Any]]) -> bool:
     """Whether no position was asked for since a run had its result."""
     told = [m.get("event") for m in marks]
     ends = [i for i, event in enumerate(told) if event == "finished"]

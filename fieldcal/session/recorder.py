@@ -38,7 +38,7 @@ from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line, read_marks, taken_windows
 from fieldcal.session.sample_files import read_samples
 from fieldcal.session.sample_table import samples_schema, to_record_batch
-from fieldcal.session.stream_damage import no_samples_text
+from fieldcal.session.stream_damage import MARKER, no_samples_text
 
 FLUSH_INTERVAL = 0.2
 """Longest time that samples are kept in memory only, s of the host's clock."""
@@ -174,9 +174,10 @@ class Recorder:
     def _refuse_unreadable(self, path: Path, data: bytes) -> None:
         """Refuse to write over samples that cannot be read, but could be restored.
 
-        What a run leaves that is killed within its first batch is no such file.
+        The beginning of a first batch, as of a run that was killed, is no such file.
         """
-        if path.exists() and taken_windows(read_marks(self.folder / MARKS)):
+        begun = not data or data.startswith(MARKER)
+        if not begun and taken_windows(read_marks(self.folder / MARKS)):
             raise SessionError(
                 f"{path}: {no_samples_text(data)}; to take all positions of this"
                 " session anew, delete this file first"

@@ -21,6 +21,7 @@ def check_change(
     limits: GradeLimits,
     family: Sequence[Calibration] | None,
     warmth: Mapping[str, float],
+    serial: str = "",
 ) -> list[Check]:
     """Compare each group with earlier calibrations, by its most unusual parameter.
 
@@ -31,10 +32,12 @@ def check_change(
     family : earlier calibrations at its temperature; None without a history
     warmth : additional uncertainty for the change of temperature since, 1 sigma, by
         full name
+    serial : of the device; empty if it is not stated
 
     """
     if family is None:
-        says = "no comparison with earlier calibrations: no serial number (--serial)"
+        why = "the history was not read" if serial else "no serial number (--serial)"
+        says = f"no comparison with earlier calibrations: {why}"
         return [Check("change", None, says)]
     if not family:
         says = "no comparison: this is the first calibration of this device"

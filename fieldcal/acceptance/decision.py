@@ -96,8 +96,9 @@ def decide(
     """Check a calibration against limits."""
     verification = check_verification(circumstances.verification, limits)
     change = check_change(
-        calibration, limits, circumstances.family, circumstances.temperature_sigma
-    )
+        calibration, limits, circumstances.family, circumstances.temperature_sigma,
+        str(about.device.get("serial", "")),
+    )  # fmt: skip
     turns = check_turns(calibration, limits)
     witnesses = [
         what

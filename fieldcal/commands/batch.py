@@ -116,7 +116,7 @@ def _print_summary(args: argparse.Namespace, batch: SessionBatch, done: int) -> 
     rows = [one for some in batch.stored_rows() for one in some]
     failed = [one for one in rows if one.error]
     solved = [one for one in rows if not one.error]
-    bad = [one for one in solved if not one.good or one.go is False]
+    bad = sum(not one.good for one in solved)
     go = sum(one.go is True for one in solved)
     judged = sum(one.go is not None for one in solved)
     if args.json:
@@ -125,9 +125,10 @@ def _print_summary(args: argparse.Namespace, batch: SessionBatch, done: int) -> 
         say = sys.stdout.write
         say(f"{len(rows)} sessions, {done} of them done now: {len(solved)} solved")
         say(f", {go} of {judged} GO" if judged else ", none to be judged")
-        say(f", {len(bad)} not good, {len(failed)} without a result\n")
+        say(f", {bad} not good, {len(failed)} without a result")
+        say(" (the column error says why)\n" if failed else "\n")
         say(f"written: {args.output}\nstore: {batch.database.location_text}\n")
-    return 1 if bad or failed else 0
+    return 1 if bad or go < judged or failed else 0
 
 
 def _print_json(args: argparse.Namespace, rows: list[StoredSession], done: int) -> None:

@@ -99,13 +99,15 @@ def process_with_progress(
 
     from fieldcal.commands.console import EscapingConsole
 
+    console = EscapingConsole(stderr=True)
     bar = progress.Progress(
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         progress.TextColumn("{task.fields[rate]}"),
         progress.TimeRemainingColumn(),
-        console=EscapingConsole(stderr=True),
+        console=console,
         transient=True,
+        disable=not console.is_terminal,  # it would leave an empty line
     )
     with bar, contextlib.closing(batch.process(left, pool)) as done:
         task = bar.add_task("", total=len(left), rate="")

@@ -94,10 +94,12 @@ class Database:
                 " 'fieldcal[fleet]', or name a file"
             ) from error
         except (SQLAlchemyError, OSError) as error:
-            said = str(getattr(error, "orig", None) or error).strip()
+            said = " ".join(str(getattr(error, "orig", None) or error).split())
+            mend = "mend that, move the file away, or name another with --history"
+            if is_address(self.place):
+                mend = "see that its server runs, or name another with --history"
             raise InputError(
-                f"{self.location_text}: the history cannot be used ({said}); mend that,"
-                " move the file away, or name another with --history"
+                f"{self.location_text}: the history cannot be used ({said}); {mend}"
             ) from error
 
     def _while_away(self, work: Transaction[T], write: bool) -> T:

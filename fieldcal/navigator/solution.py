@@ -102,8 +102,15 @@ def read_solution(path: Path) -> NavigationSolution:
         )
     table = _numbers(path, rows[1:], len(heading))
     t = table[:, heading.index("t")]
-    if len(t) < 2 or not (np.diff(t) > 0).all():
-        raise InputError(f"{path}: t does not ascend: sort the lines by time")
+    if len(t) < 2:
+        raise InputError(f"{path}: has {len(t)} lines of numbers; two are the least")
+    if len(back := np.flatnonzero(np.diff(t) <= 0)):
+        line, before = rows[int(back[0]) + 2][0], t[back[0]]
+        raise InputError(
+            f"{path}: line {line}: t does not ascend, it is {t[back[0] + 1]:g} s behind"
+            f" {before:g} s: sort the lines by time, or copy the file again if it ends"
+            " there"
+        )
     values = np.full((len(t), 6), np.nan)
     for i, name in enumerate(names):
         if name in heading:

@@ -65,7 +65,7 @@ def read_description(path: Path) -> Description:
     except (OSError, UnicodeDecodeError) as error:
         raise SessionError(f"{path}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
-        raise SessionError(f"{path}: is not TOML: {error}") from error
+        raise SessionError(f"{path}: is not TOML: {error}; mend it") from error
     try:
         return parse_description(raw)
     except InputError as error:

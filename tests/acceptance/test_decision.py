@@ -78,6 +78,15 @@ def test_a_sound_calibration_is_go_and_says_what_it_could_not_check() -> None:
     assert again.info["expectation"][1]["seconds"] == 600.0
 
 
+def test_a_history_that_could_not_be_read_is_no_lack_of_a_serial_number() -> None:
+    about = replace(ABOUT, device={"serial": "A1"})
+    for one, why in ((ABOUT, "no serial number"), (about, "the history was not read")):
+        made = decide(calibration(), one, BOUNDS, Circumstances([21.0], LINK))
+        (change,) = (c for c in made.checks if c.name == "change")
+        assert change.ok is None
+        assert change.says.startswith(f"no comparison with earlier calibrations: {why}")
+
+
 @pytest.mark.parametrize(
     ("found", "seen", "says"),
     [

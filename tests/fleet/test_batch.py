@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -26,6 +29,7 @@ from fieldcal.fleet.tree import fingerprint, sessions_in
 from fieldcal.fleet.workers import WorkerPool
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
+from fieldcal.history.sessions import StoredSession
 from fieldcal.session.folder import RESULT
 from fieldcal.sim_device.profile import Profile
 
@@ -117,6 +121,31 @@ def test_a_log_file_says_how_far_a_batch_is(
     said = capsys.readouterr().err
     assert "1 of 3 sessions done, about 0 min left" in said
     assert "3 of 3 sessions done" in said
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "says", "code"),
+    [
+        ([(True, True), (True, False)], "2 solved, 1 of 2 GO, 0 not good, 0 wi", 1),
+        ([(True, None), (False, None)], "2 solved, none to be judged, 1 not good", 1),
+        ([(True, True), (True, None)], "2 solved, 1 of 1 GO, 0 not good, 0 wit", 0),
+    ],
+)
+def test_no_go_is_not_called_not_good(
+    outcomes: list[tuple[bool, bool | None]],
+    says: str,
+    code: int,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rows = [StoredSession(f"/s/{i}", good=g, go=o) for i, (g, o) in enumerate(outcomes)]
+    made = SimpleNamespace(
+        stored_rows=lambda: [rows], database=Database(str(tmp_path / "h.sqlite"))
+    )
+    args = argparse.Namespace(json=False, output=tmp_path / "t.parquet")
+    assert command._print_summary(args, cast(Any, made), 2) == code
+    said = capsys.readouterr().out
+    assert says in said and "column error" not in said
 
 
 def test_a_row_has_the_folder_that_was_asked_for(tree: Path, tmp_path: Path) -> None:

@@ -434,7 +434,8 @@ def test_an_address_that_is_none_is_said_without_its_password() -> None:
         everything("nothing://x/y")
     with pytest.raises(InputError, match="cannot be used") as told:
         everything("postgresql://lab:secret@127.0.0.1:1/imus")
-    assert "secret" not in str(told.value)
+    assert "secret" not in str(told.value) and str(told.value).isprintable()
+    assert "); see that its server runs, or name another with" in str(told.value)
 
 
 @pytest.mark.parametrize(

@@ -221,7 +221,12 @@ def test_the_command_writes_a_result_that_others_take(
         ("solution.csv", "t,vn\n0,0\n1,x\n", "line 3 is not 2 numbers"),
         ("solution.csv", "t,vn\n\n0,0\n\n1,x\n", "line 5 is not 2 numbers"),
         ("solution.csv", "t,vn\n0,0\n1,nan\n", "line 3 has a number that is none"),
-        ("solution.csv", "t,vn\n1,0\n0,0\n", "t does not ascend"),
+        (
+            "solution.csv",
+            "t,vn\n1,0\n0,0\n",
+            "line 3: t does not ascend, it is 0 s beh",
+        ),
+        ("solution.csv", "t,vn\n1,0\n", "has 1 lines of numbers"),
         ("solution.csv", "t,vn\n0,0\n5,0\n", "must lie within 0 to 5 s"),
         ("solution.csv", "", "no heading"),
         ("session.toml", "[[position]]\nstart_s=0\nend_s=9", "the attitude of its run"),

@@ -7,6 +7,7 @@ positions that the operator accepted in spite of a warning.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -250,7 +251,10 @@ def store_in_history(
         taken_at, part = calibration.info.get("taken_at"), recorded_part(session.folder)
         history.add(taken_at, session.folder, calibration, part)
     except FieldcalError as error:
-        return f"the calibration is not stored in the history: {error}"
+        return (
+            f"the calibration is not stored in the history: {error}; once that is"
+            f" mended, fieldcal batch {shlex.quote(str(session.folder))} puts it there"
+        )
     return ""
 
 

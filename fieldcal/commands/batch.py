@@ -123,7 +123,8 @@ def _print_summary(args: argparse.Namespace, batch: SessionBatch, done: int) -> 
         _print_json(args, rows, done)
     else:
         say = sys.stdout.write
-        say(f"{len(rows)} sessions, {done} of them done now: {len(solved)} solved")
+        some = f"{len(rows)} session{'s' * (len(rows) != 1)}"
+        say(f"{some}, {done} of them done now: {len(solved)} solved")
         say(f", {go} of {judged} GO" if judged else ", none to be judged")
         say(f", {bad} not good, {len(failed)} without a result")
         say(" (the column error says why)\n" if failed else "\n")

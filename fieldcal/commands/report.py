@@ -99,8 +99,12 @@ def write_report(
 def _earlier_calibrations(
     folder: Path, history: StoreLocation | None
 ) -> list[EarlierCalibration]:
-    """Calibrations of the device in the history that are earlier than this session."""
+    """Calibrations of the device in the history that are earlier than this session.
+
+    A history that cannot be read is said, and none are taken: the session is as good.
+    """
     from fieldcal.acceptance.assessment import start_time
+    from fieldcal.core.errors import InputError
     from fieldcal.history.location import default_location
     from fieldcal.history.store import History, earlier_runs
     from fieldcal.report import EarlierCalibration
@@ -111,7 +115,11 @@ def _earlier_calibrations(
     serial = session.about.device.get("serial")
     if not serial:
         return []
-    runs = History(history or default_location()).runs(str(serial))
+    try:
+        runs = History(history or default_location()).runs(str(serial))
+    except InputError as error:
+        sys.stderr.write(f"fieldcal: report without earlier calibrations: {error}\n")
+        return []
     taken_at, part = start_time(list(session.marks())), recorded_part(folder)
     before = earlier_runs(runs, folder, taken_at, part)
     return [EarlierCalibration(run.taken_at[:10], run.calibration) for run in before]

@@ -211,6 +211,19 @@ def test_later_runs_are_no_earlier_ones(tmp_path: Path, solved: Path) -> None:
     assert "4 calibrations;" in page, "it is no earlier one of itself"
 
 
+def test_a_history_that_is_away_costs_no_report(
+    tmp_path: Path, solved: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    away = "postgresql://lab@127.0.0.1:1/imus"
+    session = Session.open(shutil.copytree(solved, tmp_path / "s"))
+    assert "Residuals" in write_report(session.folder, history=away).read_text()
+    said = capsys.readouterr().err
+    assert said.startswith(f"fieldcal: report without earlier calibrations: {away}")
+    found = with_provenance(solve(observe(session)[0]), session.about)
+    told = store_in_history(History(away), session, found)
+    assert f"once that is mended, fieldcal batch {session.folder} puts it" in told
+
+
 def test_a_session_of_unknown_time_counts_as_the_newest_and_says_so(
     tmp_path: Path,
 ) -> None:

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(
     find_browser() is None, reason="there is no Chromium to show the page in"
 )
 
-PHONE, TABLET = (390, 844), (1180, 820)
+PHONE, TABLET, SMALL = (390, 844), (1180, 820), (320, 568)
 WORDS = "document.getElementById('words')?.textContent"
 
 
@@ -68,6 +68,22 @@ def test_it_shows_what_to_do_on_any_screen(
     assert page.value("document.getElementById('take').offsetHeight") >= 48
     large = "parseFloat(getComputedStyle(document.getElementById('words')).fontSize)"
     assert page.value(large) > 40
+
+
+def test_what_is_wrong_is_seen_on_a_small_phone(
+    page: Screen, server: PageServer
+) -> None:
+    """Nobody scrolls with a device in both hands; no button runs off to the side."""
+    server.board.sentence_told("it has not been turned yet")
+    page.size(*SMALL)
+    opened(page, server)
+    told = "document.getElementById('told').getBoundingClientRect()"
+    stage = "document.getElementById('stage').getBoundingClientRect()"
+    page.until(f"{told}.height > 0 && {told}.bottom <= {stage}.top")
+    tap(page, "#take")
+    page.until("document.getElementById('mine').hidden", False)
+    right = "[...document.querySelectorAll('#mine button')].at(-1)"
+    assert page.value(f"{right}.getBoundingClientRect().right <= innerWidth - 8")
 
 
 def test_a_third_angle_turns_the_box_about_its_own_vertical_axis(

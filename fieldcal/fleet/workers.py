@@ -31,6 +31,9 @@ T = TypeVar("T")
 AHEAD = 2
 """Items submitted per worker, so that no worker waits for the next item."""
 
+WITH_PORT = {"tcp", "tls", "ws", "wss"}
+"""Schemes of Dask's addresses that name a host and a port."""
+
 DIED = (
     "its process was killed, by the system for want of memory or processor time perhaps"
 )
@@ -87,7 +90,8 @@ def dask_pool(address: str) -> Iterator[WorkerPool]:
     Raises
     ------
     InputError
-        If Dask is not installed, or no scheduler or no worker is there.
+        If Dask is not installed, `address` is none, or no scheduler or no worker is
+        there.
 
     """
     try:
@@ -97,9 +101,10 @@ def dask_pool(address: str) -> Iterator[WorkerPool]:
             "--scheduler needs Dask: pip install 'fieldcal[fleet]'"
         ) from error
     engine: Any = distributed  # it states types of some functions only
+    _refuse_no_address(engine, address)
     try:
         client = engine.Client(address, set_as_default=False, timeout="10s")
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise InputError(
             f"{address}: no scheduler answers ({error}); start one with dask scheduler"
         ) from error
@@ -111,6 +116,20 @@ def dask_pool(address: str) -> Iterator[WorkerPool]:
                 " --nthreads 1, where fieldcal is installed and the folders are"
             )
         yield WorkerPool(client.get_executor, workers)
+
+
+def _refuse_no_address(engine: Any, address: str) -> None:
+    """Refuse what Dask could not connect to: its client would wait, and then break."""
+    try:
+        scheme, place = engine.comm.parse_address(address)
+        engine.comm.registry.get_backend(scheme)
+        if scheme in WITH_PORT:
+            engine.comm.parse_host_port(place)
+    except ValueError as error:
+        raise InputError(
+            f"--scheduler {address}: is no address ({error}); write it as"
+            " tcp://HOST:8786, as dask scheduler prints it"
+        ) from error
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,11 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 
+from fieldcal.core.errors import SessionInUse
 from fieldcal.core.sentences import join_words
 from fieldcal.run.resuming import is_decided, is_finished
 from fieldcal.session.folder import Session
+from fieldcal.session.lock import refuse_in_use
 from fieldcal.session.marks import taken_windows
 
 
@@ -55,10 +57,10 @@ def untaken_sentence(session: Session) -> str:
         verb = "were" if len(untaken) > 1 else "was"
         said.append(f"{_listed(untaken)} of the plan {verb} not taken")
     elif not lost and _run_table(session) and not is_finished([*session.marks()]):
-        said.append("the run was stopped before it had its result")
+        said.append("the run has not come to its result")
     if not said or not _run_table(session) or is_decided(session):
         return "; ".join(said)
-    return f"{'; '.join(said)}: {_resume_command(session)} goes on with the run"
+    return f"{'; '.join(said)}: {_way_on(session)}"
 
 
 def _listed(labels: Sequence[str]) -> str:
@@ -71,9 +73,13 @@ def _run_table(session: Session) -> Mapping[str, object]:
     return found if isinstance(found, Mapping) else {}
 
 
-def _resume_command(session: Session) -> str:
-    """The command that goes on with a run, also with that of a further device."""
+def _way_on(session: Session) -> str:
+    """How a run goes on, also with that of a further device; it may do so already."""
     folder, further = session.folder, _run_table(session).get("further", ())
     if isinstance(further, list) and session.about.device.get("address") in further:
         folder = folder.absolute().parent
-    return f"fieldcal run --resume {shlex.quote(str(folder))}"
+    try:
+        refuse_in_use(session.folder)
+    except SessionInUse:
+        return "it is being recorded"
+    return f"fieldcal run --resume {shlex.quote(str(folder))} goes on with the run"

@@ -81,10 +81,28 @@ def test_a_scheduler_of_dask_does_the_same() -> None:
     assert found == {"A", "B", "C"}
 
 
-def test_a_scheduler_that_is_none_is_said() -> None:
-    pytest.importorskip("distributed")
-    with pytest.raises(InputError, match="no scheduler answers"):
-        with dask_pool("nonsense://1"):
+@pytest.mark.parametrize("address", ["nonsense://1", "127.0.0.1", "tcp://h:x", ""])
+def test_an_address_of_no_scheduler_is_refused_at_once(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", None)  # it would wait for minutes
+    with pytest.raises(InputError, match="is no address .*write it as tcp://HOST"):
+        with dask_pool(address):
+            raise AssertionError
+
+
+def test_a_scheduler_that_does_not_answer_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    distributed = pytest.importorskip("distributed")
+
+    def absent(*_: object, **__: object) -> None:
+        raise OSError("nobody is there")
+
+    monkeypatch.setattr(distributed, "Client", absent)
+    with pytest.raises(InputError, match=r"answers \(nobody is there\); start one"):
+        with dask_pool("tcp://127.0.0.1:1"):
             raise AssertionError
 
 

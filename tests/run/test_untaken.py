@@ -64,12 +64,21 @@ def test_a_run_that_was_stopped_names_what_it_lacks(tmp_path: Path) -> None:
 def test_a_run_without_a_result_has_more_to_do(tmp_path: Path) -> None:
     stopped = recorded(tmp_path / "s", 3)
     assert untaken_sentence(stopped) == (
-        "the run was stopped before it had its result: fieldcal run --resume"
+        "the run has not come to its result: fieldcal run --resume"
         f" {tmp_path / 's'} goes on with the run"
     )
     with Recorder(tmp_path / "s", None) as recorder:
         recorder.mark("finished")
     assert untaken_sentence(Session.open(tmp_path / "s")) == ""
+
+
+def test_a_run_in_progress_is_not_told_to_go_on(tmp_path: Path) -> None:
+    recorded(tmp_path / "s", 2)
+    said = f"position {THIRD} of the plan was not taken: "
+    with Recorder(tmp_path / "s", None):
+        now = untaken_sentence(Session.open(tmp_path / "s"))
+    assert now == f"{said}it is being recorded"
+    assert untaken_sentence(Session.open(tmp_path / "s")).startswith(f"{said}fieldcal")
 
 
 def test_what_was_taken_and_lost_is_told_apart(tmp_path: Path) -> None:

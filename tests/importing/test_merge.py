@@ -336,6 +336,27 @@ def test_files_of_one_time_with_other_samples_are_refused(
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("first", "begins", "refused"),
+    [(250, 3600.0, True), (250, 1714564800.0, True), (420, 1714564800.0, True),
+     (420, 3600.0, False)],
+)  # fmt: skip
+def test_files_that_are_named_in_the_wrong_order(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    first: int,
+    begins: float,
+    refused: bool,
+) -> None:
+    """A clock without a date that is behind has begun anew, unless samples tell."""
+    _, files = overlapping(tmp_path, first, begins)
+    call = ["import", *files[::-1], "--in-order", "-o", str(tmp_path / "out")]
+    assert main(call) == (2 if refused else 0)
+    said = capsys.readouterr().err
+    away = f"a.csv: begins {first / HZ:.2f} s before b.csv, which is named before"
+    assert (away in said) == refused and ("times start anew" in said) != refused
+
+
 def test_a_bad_row_behind_an_overlap_is_named_by_its_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,6 +16,7 @@ from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.session.overlap import Overlap
 from fieldcal.importing.times.clock_text import DAY
 from fieldcal.importing.times.row_validator import RowValidator
+from fieldcal.importing.units.time_units import UNIX
 
 BETWEEN = 10.0
 """Time taken to have passed between two files of which no clock tells, s."""
@@ -186,6 +187,7 @@ class FilesInOrder(SeveralFiles):
         """What a file that begins so has in common with the one before it.
 
         None if it begins behind the end of that one, or by a clock that began anew.
+        One that counts from 1970 does not.
 
         Parameters
         ----------
@@ -196,8 +198,14 @@ class FilesInOrder(SeveralFiles):
         if np.isnan(ended) or begins > ended:
             return None
         before, part = self._parts[len(self._shared) - 2 : len(self._shared)]
-        again = before.alone(stream_name(before)).blocks(stream_name(before))
-        overlap = Overlap((before.path.name, str(part.path)), again, begins)
+        names = before.path.name, str(part.path)
+        overlap = Overlap(names, _blocks_again(before), begins)
+        if begins < overlap.first:
+            away = Overlap(names[::-1], _blocks_again(part), overlap.first)
+            dated = UNIX[0] <= begins < UNIX[1]
+            if not away.begins_anew and (dated or away.contains(overlap.head)):
+                raise away.order_refusal()
+            return None
         if overlap.holds(block):
             return overlap
         if overlap.begins_anew:
@@ -242,6 +250,12 @@ class FilesInOrder(SeveralFiles):
             return before
         self.guessed["order"] = AS_NAMED
         return last + BETWEEN - begins
+
+
+def _blocks_again(part: Recording) -> Iterator[Block]:
+    """Samples of a file, read once more, without saying anything twice."""
+    name = stream_name(part)
+    return part.alone(name).blocks(name)
 
 
 def stream_name(part: Recording) -> str:

@@ -16,6 +16,9 @@ from fieldcal.core.samples import Array, Block, concat
 STAMP = 1e-6
 """Largest difference of the stamps of one sample in two files, s: digits of stamps."""
 
+COMPARED = 200
+"""Samples at the beginning of a file that tell whether they are in another."""
+
 AT_SEAM = 0.5
 """Part of the file before, at its end, in which the next one may begin. One that begins
 further ahead has a clock that began anew, as have files that all begin near zero."""
@@ -33,6 +36,7 @@ class Overlap:
     Attributes
     ----------
     shared : samples of the next file that were found in the file
+    head : first samples of the file
 
     """
 
@@ -40,13 +44,19 @@ class Overlap:
         self, names: tuple[str, str], blocks: Iterable[Block], begins: float
     ) -> None:
         self._names, self.shared = names, 0
-        parts, first = list[Block](), np.nan
+        parts, head = list[Block](), None
         for block in blocks:
-            known = block.t[np.isfinite(block.t)]
-            first = known[0] if len(known) and np.isnan(first) else first
+            if head is None and np.isfinite(block.t).any():
+                head = block[np.flatnonzero(np.isfinite(block.t))[:COMPARED]]
             parts.append(block[np.flatnonzero(block.t >= begins - STAMP)])
         self._rest = concat(parts)
-        self._first, self._begins = float(first), begins
+        self.head = self._rest if head is None else head
+        self._begins = begins
+
+    @property
+    def first(self) -> float:
+        """Time of the first sample of the file, s; nan without one."""
+        return float(self.head.t[0]) if len(self.head) else np.nan
 
     @property
     def seconds(self) -> float:
@@ -57,11 +67,16 @@ class Overlap:
     def begins_anew(self) -> bool:
         """Whether the clock of the next file began anew, as far as its times tell."""
         end = self._begins + self.seconds
-        return self.seconds > AT_SEAM * (end - self._first)
+        return self.seconds > AT_SEAM * (end - self.first)
 
     def holds(self, block: Block) -> bool:
         """Whether the samples of a block up to the end of the file are in the file."""
         return self._split(block)[1]
+
+    def contains(self, block: Block) -> bool:
+        """Whether any sample of a block lies in the file's time, and all are in it."""
+        count, same = self._split(block)
+        return count > 0 and same
 
     def without_shared(self, block: Block) -> Block:
         """A block of the next file without samples that are in the file.
@@ -87,6 +102,14 @@ class Overlap:
             " Import them one by one if they are of two devices; cut what overlaps from"
             " one of them; or, if the clock began anew between them, name the columns"
             " without the time (--columns -,ax,…) and state --rate"
+        )
+
+    def order_refusal(self) -> InputError:
+        """Error about a file that is named behind the next one in time."""
+        earlier, later = self._names
+        return InputError(
+            f"{earlier}: begins {self._begins - self.first:.2f} s before {later}, which"
+            " is named before it: name the files in the order of their times"
         )
 
     def sentence(self) -> str:

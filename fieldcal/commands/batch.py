@@ -82,9 +82,16 @@ def run(args: argparse.Namespace) -> int:
     )
     every = [str(folder) for folder in batch.folders]
     left = batch.unprocessed() if args.resume else every
-    if left:
-        with worker_pool(args) as pool:
-            process_with_progress(batch, left, pool)
+    try:
+        if left:
+            with worker_pool(args) as pool:
+                process_with_progress(batch, left, pool)
+    except KeyboardInterrupt:
+        sys.stderr.write(
+            "fieldcal batch: what was finished is stored; the same command with"
+            " --resume goes on with the others\n"
+        )
+        raise
     batch.write(args.output)
     for pair in batch.shorter_copies():
         sys.stderr.write(f"fieldcal batch: {copy_sentence(*pair)}\n")

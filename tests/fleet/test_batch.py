@@ -148,6 +148,21 @@ def test_no_go_is_not_called_not_good(
     assert says in said and "column error" not in said
 
 
+def test_who_interrupts_a_batch_hears_how_it_goes_on(
+    tree: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def pressed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(progress, "process_with_progress", pressed)
+    call = ["batch", str(tree), "--history", str(tmp_path / "h"), "-o"]
+    assert main([*call, str(tmp_path / "t.parquet")]) == 130
+    assert "is stored; the same command with --resume" in capsys.readouterr().err
+
+
 def test_a_row_has_the_folder_that_was_asked_for(tree: Path, tmp_path: Path) -> None:
     """Where a worker reaches it by another path, its row would not be found again."""
     link = tmp_path / "link"

@@ -14,6 +14,7 @@ from fieldcal.run.resuming import is_decided, is_finished
 from fieldcal.session.folder import Session
 from fieldcal.session.lock import refuse_in_use
 from fieldcal.session.marks import taken_windows
+from fieldcal.session.recorder import SAMPLES
 
 
 def untaken_positions(session: Session) -> tuple[list[str], list[str]]:
@@ -58,7 +59,8 @@ def untaken_sentence(session: Session) -> str:
         said.append(f"{_listed(untaken)} of the plan {verb} not taken")
     elif not lost and _run_table(session) and not is_finished([*session.marks()]):
         said.append("the run has not come to its result")
-    if not said or not _run_table(session) or is_decided(session):
+    goes_on = _run_table(session) and (session.folder / SAMPLES).exists()
+    if not said or not goes_on or is_decided(session):
         return "; ".join(said)
     return f"{'; '.join(said)}: {_way_on(session)}"
 

@@ -36,7 +36,7 @@ from fieldcal.session.file_writing import write_atomically
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line, read_marks, taken_windows
-from fieldcal.session.sample_files import read_samples
+from fieldcal.session.sample_files import ENDINGS, read_samples
 from fieldcal.session.sample_table import samples_schema, to_record_batch
 from fieldcal.session.stream_damage import MARKER, no_samples_text
 
@@ -149,13 +149,21 @@ class Recorder:
         Raises
         ------
         SessionError
-            If samples are there of which none can be read.
+            If samples are there of which none can be read, or in a file that a run does
+            not write.
 
         """
         from fieldcal.session.arrow_encoder import ArrowEncoder
         from fieldcal.session.arrow_stream import decode_stream
 
         path = self.folder / SAMPLES
+        for ending in ENDINGS:
+            other = self.folder / f"samples{ending}"
+            if other != path and other.is_file():
+                raise SessionError(
+                    f"{other}: a run goes on with {SAMPLES} only, and a session has one"
+                    " samples file: begin a new run, or solve this session as it is"
+                )
         data = path.read_bytes() if path.exists() else b""
         found = decode_stream(data, samples_schema())
         if found.batches:

@@ -119,7 +119,8 @@ def _gunzip(path: Path, data: bytes) -> tuple[bytes, bool]:
         out = unpack.decompress(data)
     except zlib.error as error:
         raise SessionError(
-            f"{path}: is not a gzip file ({error}); copy it again from where it came"
+            f"{path}: is no gzip file, or damaged ({error}); copy it again from where"
+            " it came"
         ) from error
     while unpack.eof and unpack.unused_data.strip(b"\0"):
         data, unpack = unpack.unused_data, zlib.decompressobj(_GUNZIP)
@@ -142,6 +143,11 @@ def _first_bad_row(names: Sequence[str], data: bytes) -> str:
     """Text about the first invalid row; slow, used after a failure only."""
     lines = data.decode(errors="replace").splitlines()
     for row, line in enumerate(lines[1:], start=1):
+        if "\0" in line:
+            return (
+                f"row {row} holds {line.count(chr(0))} zero bytes, as after a power"
+                " cut: copy the file again from where it came, or remove that row"
+            )
         cells = line.split(",")
         if line and len(cells) != len(names):
             return (

@@ -72,6 +72,16 @@ def test_a_run_without_a_result_has_more_to_do(tmp_path: Path) -> None:
     assert untaken_sentence(Session.open(tmp_path / "s")) == ""
 
 
+def test_a_recording_in_another_file_is_not_gone_on_with(tmp_path: Path) -> None:
+    recorded(tmp_path / "s", 2)
+    (tmp_path / "s" / "samples.arrows").unlink()
+    (tmp_path / "s" / "samples.csv").write_text("t,ax,ay,az\n5,0,-9.8,0\n")
+    assert untaken_sentence(Session.open(tmp_path / "s")) == (
+        "no sample is left of position 2 (turned); position"
+        f" {THIRD} of the plan was not taken"
+    )
+
+
 def test_a_run_in_progress_is_not_told_to_go_on(tmp_path: Path) -> None:
     recorded(tmp_path / "s", 2)
     said = f"position {THIRD} of the plan was not taken: "

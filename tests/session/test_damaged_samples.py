@@ -152,6 +152,24 @@ def test_a_file_of_which_nothing_can_be_read_is_kept(
     assert len(Session.open(folder).block) == ROWS
 
 
+def test_a_run_adds_no_second_samples_file(folder: Path) -> None:
+    (folder / SAMPLES).unlink()
+    (folder / "samples.csv").write_text("t,ax,ay,az\n0,0,-9.8,0\n")
+    with pytest.raises(SessionError, match=r"samples.csv: a run goes on with samples"):
+        Recorder(folder, None)
+    assert not (folder / SAMPLES).exists()
+    assert len(Session.open(folder).block) == 1
+
+
+def test_zeros_in_a_text_file_are_told_as_such(folder: Path) -> None:
+    (folder / SAMPLES).unlink()
+    (folder / "samples.csv").write_bytes(
+        b"t,ax,ay,az\n0,0,-9.8,0\n1,0,\0\0\0\0,-9.8,0\n2,0,-9.8,0\n"
+    )
+    with pytest.raises(SessionError, match="row 2 holds 4 zero bytes, as after a po"):
+        _ = Session.open(folder).block
+
+
 @pytest.mark.parametrize(
     ("size", "says"),
     [(0, "is empty, as after a power cut"), (300, "holds no whole sample: it was cut")],

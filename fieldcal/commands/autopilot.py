@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -41,6 +42,7 @@ def write_parameters(
     from fieldcal.drivers.mavlink_parameters import same_float32
     from fieldcal.install.transaction import (
         WriteRolledBack,
+        adding_to_fault,
         broken_off,
         check_unchanged,
         install,
@@ -63,16 +65,20 @@ def write_parameters(
         sys.stderr.write(f"all {len(new)} parameters are installed already\n")
         return
     confirm(f"write these {len(new)} parameters to {device}", yes)
-    path = save(folder, device, old, new)
-    if earlier:
-        note_done(earlier[0], undone=True)
+    with adding_to_fault("nothing was written to the autopilot"):
+        path = save(folder, device, old, new)
+        if earlier:
+            note_done(earlier[0], undone=True)
     try:
         install(link, old, new)
     except WriteRolledBack:
         note_done(path, undone=True)
         raise
-    note_done(path, done=True)
-    undo = f"fieldcal undo {folder} --device {device}"
+    undo = f"fieldcal undo {shlex.quote(str(folder))} --device {shlex.quote(device)}"
+    with adding_to_fault(
+        f"all {len(new)} parameters are written and read back, which could not be noted"
+    ):
+        note_done(path, done=True)
     sys.stderr.write(
         f"written and read back: {len(new)} parameters; the old ones are in {path}\n"
         f"to take it back: {undo}\n"

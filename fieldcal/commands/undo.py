@@ -31,6 +31,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.autopilot import check_ready, confirm, open_parameters
     from fieldcal.install.transaction import (
         WriteRolledBack,
+        adding_to_fault,
         broken_off,
         check_unchanged,
         install,
@@ -53,14 +54,19 @@ def run(args: argparse.Namespace) -> int:
             unit = _offset_unit(name)
             sys.stdout.write(f"{name}: {now[name]:.9g} -> {value:.9g}{unit}\n")
         confirm(f"give these {len(old)} parameters back to {device}", args.yes)
-        note_done(path, done=False)  # from here on it may be interrupted
+        with adding_to_fault("nothing was given back to the autopilot"):
+            note_done(path, done=False)  # from here on it may be interrupted
         back = now if whole(now, new) else {**now, **new}
         try:
             install(link, back, old, "as they were written")
         except WriteRolledBack:
             note_done(path, done=True)
             raise
-    note_done(path, undone=True)
+    with adding_to_fault(
+        f"all {len(old)} parameters are given back and read back, which could not be"
+        " noted"
+    ):
+        note_done(path, undone=True)
     sys.stderr.write(f"given back and read back: {len(old)} parameters\n")
     return 0
 

@@ -8,13 +8,14 @@ What is saved says what was there, what was written, and whether that succeeded.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from fieldcal.core.documents import load_json
-from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.errors import DeviceError, InputError, SessionError
 from fieldcal.drivers.mavlink_dialog import parameter_list
 from fieldcal.drivers.mavlink_installed import InstalledCalibration, identity_parameters
 from fieldcal.drivers.mavlink_parameter_names import (
@@ -148,6 +149,22 @@ def unfinished(folder: Path) -> tuple[Path, dict[str, Any]] | None:
         except (OSError, ValueError, KeyError, AttributeError, TypeError):
             continue
     return None
+
+
+@contextmanager
+def adding_to_fault(outcome: str) -> Iterator[None]:
+    """Add to an error about a file what the autopilot has.
+
+    Raises
+    ------
+    SessionError
+        The same one, with `outcome` behind it.
+
+    """
+    try:
+        yield
+    except SessionError as error:
+        raise SessionError(f"{error}; {outcome}") from error
 
 
 def save(

@@ -127,7 +127,7 @@ def read_plan(path: Path) -> dict[str, Any]:
     except IsADirectoryError as error:
         raise InputError(
             f"{path}: is a folder, no plan file; an interrupted run goes on with"
-            f" fieldcal run --resume {path}"
+            f" fieldcal run --resume {shlex.quote(str(path))}"
         ) from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error

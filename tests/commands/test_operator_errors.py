@@ -154,10 +154,12 @@ def test_what_was_typed_wrong_is_one_sentence_and_one_object(
 def test_a_session_named_as_a_plan_goes_on_with_resume(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["run", str(tmp_path)]) == 2
+    folder = tmp_path / "bench 7"
+    folder.mkdir()
+    assert main(["run", str(folder)]) == 2
     said = capsys.readouterr().err
-    assert f"{tmp_path}: is a folder, no plan file" in said
-    assert f"fieldcal run --resume {tmp_path}" in said and "Errno" not in said
+    assert f"{folder}: is a folder, no plan file" in said
+    assert f"fieldcal run --resume '{folder}'" in said and "Errno" not in said
 
 
 def test_a_recording_is_no_noise_file(

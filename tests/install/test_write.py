@@ -23,11 +23,12 @@ from processes import FIELDCAL, simulated
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
 from fieldcal.commands.write import change_table, propose_changes
-from fieldcal.core.errors import InputError
+from fieldcal.core.errors import InputError, SessionError
 from fieldcal.drivers.mavlink_installed import InstalledCalibration
 from fieldcal.drivers.mavlink_parameter_names import ARDUPILOT, PX4, parameter_names
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.install.proposal import changes, problems
+from fieldcal.session.file_writing import write_atomically
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 
@@ -181,6 +182,44 @@ def test_written_read_back_and_undone(
         old = [there.values[n] for n in wanted]
         np.testing.assert_allclose(list(kept.values()), old, rtol=1e-6)
         assert main(["undo", str(folder), "--yes"]) == 2
+
+
+def test_a_full_disk_says_what_the_autopilot_has(
+    session: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Before anything is written, and behind it, where it would seem to have failed."""
+    room = [0]
+
+    def write(path: Path, text: str) -> Path:
+        room[0] -= 1
+        if room[0] < 0:
+            raise SessionError(f"{path}: cannot be written: the disk is full")
+        return write_atomically(path, text)
+
+    monkeypatch.setattr("fieldcal.install.transaction.write_atomically", write)
+    there = installed()
+    with autopilot(old_query(there)) as url:
+        for command, before, behind in (
+            ("write", "nothing was written to", "all 9 parameters are written and"),
+            ("undo", "nothing was given back to", "all 9 parameters are given back"),
+        ):
+            call = [command, str(session), "--device", url, "--yes"]
+            for files, said in ((0, before), (1, behind)):
+                room[0] = files
+                assert main(call) == 2
+                assert f"the disk is full; {said}" in capsys.readouterr().err
+
+
+def test_how_to_undo_is_told_as_a_shell_takes_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    there = installed()
+    folder = make(tmp_path / "bench 7", calibration(), there)
+    with autopilot(old_query(there)) as url:
+        assert main(["write", str(folder), "--device", url, "--yes"]) == 0
+    assert f"undo '{folder}' --device '{url}'" in capsys.readouterr().err
 
 
 def test_a_parameter_that_is_not_taken_is_noticed_and_all_is_undone(

@@ -16,6 +16,9 @@ from fieldcal.session.lock import refuse_in_use
 from fieldcal.session.marks import taken_windows
 from fieldcal.session.recorder import SAMPLES
 
+VERIFYING = "the one that verifies"
+"""What the position is called that is not fitted, behind others."""
+
 
 def untaken_positions(session: Session) -> tuple[list[str], list[str]]:
     """Positions that have no window, and those of whose window no sample is left.
@@ -35,7 +38,7 @@ def untaken_positions(session: Session) -> tuple[list[str], list[str]]:
             lost.append(label)
     wanted = _run_table(session).get("verify")
     if wanted and len(session.positions) not in taken_windows(session.marks()):
-        untaken.append("the one that verifies")
+        untaken.append(VERIFYING)
     return untaken, lost
 
 
@@ -56,7 +59,8 @@ def untaken_sentence(session: Session) -> str:
         )
     elif untaken:
         verb = "were" if len(untaken) > 1 else "was"
-        said.append(f"{_listed(untaken)} of the plan {verb} not taken")
+        of = "" if untaken == [VERIFYING] else " of the plan"
+        said.append(f"{_listed(untaken)}{of} {verb} not taken")
     elif not lost and _run_table(session) and not is_finished([*session.marks()]):
         said.append("the run has not come to its result")
     goes_on = _run_table(session) and (session.folder / SAMPLES).exists()
@@ -66,6 +70,8 @@ def untaken_sentence(session: Session) -> str:
 
 
 def _listed(labels: Sequence[str]) -> str:
+    if [*labels] == [VERIFYING]:
+        return "the position that verifies"
     return f"position{'s' if len(labels) > 1 else ''} {join_words(labels)}"
 
 

@@ -57,7 +57,7 @@ def test_a_run_that_was_stopped_names_what_it_lacks(tmp_path: Path) -> None:
     )
     verifying = recorded(tmp_path / "v", 3, run={**RUN, "verify": True})
     assert untaken_sentence(verifying).startswith(
-        "position the one that verifies of the plan was not taken: fieldcal run"
+        "the position that verifies was not taken: fieldcal run"
     )
 
 

@@ -6,6 +6,7 @@ import os
 import sys
 import termios
 import tty
+from contextlib import suppress
 from typing import IO, Any, Self
 
 import numpy as np
@@ -60,9 +61,10 @@ class SteeringKeys:
         return self
 
     def __exit__(self, *exc: object) -> None:
-        if self._before is not None:
-            termios.tcsetattr(self._keyboard, termios.TCSADRAIN, self._before)
-        self._screen.write("\n")
+        with suppress(termios.error, OSError):  # the terminal is gone
+            if self._before is not None:
+                termios.tcsetattr(self._keyboard, termios.TCSADRAIN, self._before)
+            self._screen.write("\n")
 
     def watched(self) -> tuple[list[int], list[int]]:
         """Files to watch for reading and for writing."""

@@ -78,6 +78,18 @@ def test_the_line_is_written_over_where_text_of_others_is_only_shown(
     assert "\\x" not in screen.getvalue()
 
 
+def test_a_terminal_that_is_closed_is_no_fault_of_the_device(
+    stream: DeviceStream,
+) -> None:
+    """A window that is closed, or a broken connection, ends it by a signal."""
+    person, program = pty.openpty()
+    with pytest.raises(KeyboardInterrupt):
+        with SteeringKeys(stream, (22.5, 2.5), program, io.StringIO()):
+            os.close(person)
+            raise KeyboardInterrupt
+    os.close(program)
+
+
 def test_orders_and_keys_do_the_same(stream: DeviceStream) -> None:
     carry_out(stream, {"bump": {"push": 1.5, "tilt_deg": 2.0, "seconds": 0.4}})
     bump, t = stream.device.body.base_motions[-1], np.linspace(0, 0.4, 4001)

@@ -114,13 +114,15 @@ def read_calibration(path: Path) -> Calibration:
     Raises
     ------
     InputError
-        If there is no calibration, or it cannot be used.
+        If there is no calibration, or it cannot be used, or the session has changed
+        since.
 
     """
     from fieldcal.calibration import Calibration
     from fieldcal.core.documents import load_json
     from fieldcal.core.errors import InputError
     from fieldcal.session.folder import RESULT
+    from fieldcal.session.result_source import outdated_text
 
     file = path / RESULT if path.is_dir() else path
     try:
@@ -138,9 +140,12 @@ def read_calibration(path: Path) -> Calibration:
             " was solved, or its result.json"
         ) from None
     try:
-        return Calibration.from_json(document)
+        found = Calibration.from_json(document)
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
+    if file.name == RESULT and (outdated := outdated_text(file.parent, document)):
+        raise InputError(outdated)
+    return found
 
 
 def comparison_table(found: Comparison) -> str:

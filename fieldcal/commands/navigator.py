@@ -27,9 +27,10 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.session import description_file
     from fieldcal.session.file_writing import write_atomically
     from fieldcal.session.folder import DESCRIPTION, RESULT
+    from fieldcal.session.result_source import with_source
 
     about = description_file.read_description(args.session / DESCRIPTION)
-    found = calibrate_navigator(args.session, about)
+    found = with_source(calibrate_navigator(args.session, about), args.session)
     text = json.dumps(found.to_json(), allow_nan=False)
     path = write_atomically(args.session / RESULT, text + "\n")
     if args.json:

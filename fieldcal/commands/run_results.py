@@ -56,12 +56,14 @@ def solve_and_decide(
     from fieldcal.evaluation.solution import solve_session
     from fieldcal.evaluation.usable_windows import usable_windows
     from fieldcal.session.folder import RESULT
+    from fieldcal.session.result_source import with_source
 
     session, repaired = repaired_session(session)
     still = usable_windows(session)
     found = with_repairs(solve_session(session, still, method=method), repaired)
     found = add_install_values(found, session)
     found = assess(found, session, still, bounds, history)
+    found = with_source(found, session.folder)
     session.write_json(RESULT, found.to_json())
     if said := store_in_history(history, session, found):
         sys.stderr.write(f"fieldcal run: {said}\n")

@@ -122,6 +122,7 @@ def _solve_and_decide(args: argparse.Namespace, session: Session) -> Calibration
     from fieldcal.commands.install_values import add_install_values
     from fieldcal.evaluation.repaired_session import repaired_session, with_repairs
     from fieldcal.evaluation.usable_windows import usable_windows
+    from fieldcal.session.result_source import with_source
 
     repaired: tuple[str, ...] = ()
     if not args.as_printed:
@@ -133,7 +134,7 @@ def _solve_and_decide(args: argparse.Namespace, session: Session) -> Calibration
     over_time = _solve_over_time(session) if args.over_time else None
     if over_time is not None:
         found = replace(found, info={**found.info, "over_time": over_time})
-    return _decide(args, found, session, still)
+    return with_source(_decide(args, found, session, still), session.folder)
 
 
 def _solve_session(

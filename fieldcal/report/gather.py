@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from fieldcal.core.errors import FieldcalError, InputError, SessionError
 from fieldcal.core.samples import Block
 from fieldcal.evaluation.usable_windows import UsableWindows, usable_windows
 from fieldcal.session.folder import RESULT, Session
+from fieldcal.session.result_source import outdated_text
 
 DIAGNOSIS = "diagnosis.json"
 AGAINST = "against.json"
@@ -138,11 +139,13 @@ def read_earlier_result(path: Path) -> EarlierCalibration:
 
 def _calibration(session: Session, document: Mapping[str, Any]) -> Calibration:
     try:
-        return Calibration.from_json(document)
+        found = Calibration.from_json(document)
     except InputError as error:
         raise SessionError(
             f"{session.folder / RESULT}: {error}; run fieldcal solve again"
         ) from error
+    outdated = outdated_text(session.folder, document)
+    return replace(found, warnings=(outdated, *found.warnings)) if outdated else found
 
 
 def _read(path: Path) -> Mapping[str, Any] | None:

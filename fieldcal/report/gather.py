@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,7 @@ class ReportMaterial:
     marks : what happened, in order
     earlier : calibrations of the same device, oldest first
     against : of against.json, None where there is none
+    outdated : what is wrong with a calibration of the session as it was before
 
     """
 
@@ -66,6 +67,7 @@ class ReportMaterial:
     marks: tuple[Mapping[str, Any], ...]
     earlier: tuple[EarlierCalibration, ...] = ()
     against: Mapping[str, Any] | None = None
+    outdated: str = ""
 
     @property
     def epoch(self) -> float:
@@ -114,6 +116,7 @@ def gather(
         marks=tuple(session.marks()),
         earlier=tuple(earlier),
         against=_read(session.folder / AGAINST),
+        outdated="" if result is None else outdated_text(session.folder, result),
     )
 
 
@@ -139,13 +142,11 @@ def read_earlier_result(path: Path) -> EarlierCalibration:
 
 def _calibration(session: Session, document: Mapping[str, Any]) -> Calibration:
     try:
-        found = Calibration.from_json(document)
+        return Calibration.from_json(document)
     except InputError as error:
         raise SessionError(
             f"{session.folder / RESULT}: {error}; run fieldcal solve again"
         ) from error
-    outdated = outdated_text(session.folder, document)
-    return replace(found, warnings=(outdated, *found.warnings)) if outdated else found
 
 
 def _read(path: Path) -> Mapping[str, Any] | None:

@@ -62,6 +62,8 @@ def page_header(material: ReportMaterial) -> PageHeader:
     under = [folder] if folder != name else []
     under += [f"serial {serial}"] if serial else []
     verdict, tone, says = _verdict(found, "nominal" in about.raw, about.nominal)
+    if material.outdated:  # whatever was decided then
+        verdict, tone, says = "outdated", "bad", f"{material.outdated}."
     return PageHeader(name, " · ".join(under), verdict, tone, says, _facts(material))
 
 

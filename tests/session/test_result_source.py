@@ -13,6 +13,7 @@ from session_folders import CALM, FACES, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.report.gather import gather
+from fieldcal.report.overview import page_header
 from fieldcal.session.folder import Session
 from fieldcal.session.result_source import made_from, outdated_text
 
@@ -72,14 +73,14 @@ def test_a_result_older_than_its_session_is_refused(
     assert f"fieldcal solve '{session}'" in told
 
 
-def test_the_report_says_so_above_the_numbers(session: Path) -> None:
-    before = gather(session).calibration
-    assert before is not None
-    assert not any("was made before" in w for w in before.warnings)
+def test_the_report_opens_with_it_instead_of_a_verdict(session: Path) -> None:
+    before = page_header(gather(session))
+    assert before.verdict != "outdated"
     another_latitude(session)
-    after = gather(session).calibration
-    assert after is not None
-    assert "session.toml was changed" in after.warnings[0]
+    after = page_header(gather(session))
+    assert (after.verdict, after.tone) == ("outdated", "bad")
+    assert "session.toml was changed" in after.advice
+    assert "run fieldcal solve" in after.advice
 
 
 def test_layout_and_comments_are_no_change(session: Path) -> None:

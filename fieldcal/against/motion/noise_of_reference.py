@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldcal.against.motion.explanation import MotionExplanation
 from fieldcal.against.motion.fit import column_estimates
-from fieldcal.core.samples import CHANNELS, UNITS
+from fieldcal.core.samples import UNITS
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 from fieldcal.model.causes.cause import TRIADS
@@ -23,15 +23,14 @@ MIN_NOISE_SIGMAS = 3.0
 def noise_densities(found: MotionExplanation) -> Iterator[tuple[str, str]]:
     """Triads of a reference whose noise shows, with its density and unit."""
     noise = found.rows.noise
-    parts = [part for part, _ in TRIADS]
-    for cause, group in found.set.members:
-        if cause.name != REFERENCE_NOISE:
+    causes = {c.part: g for c, g in found.set.members if c.name == REFERENCE_NOISE}
+    for i, (part, channels) in enumerate(TRIADS):
+        if (group := causes.get(part)) is None:
             continue
-        i = parts.index(cause.part)
         (share,), ((square,),), _ = column_estimates(found.set.state, group.columns)
         sigma = float(np.sqrt(square))
         if share > MIN_NOISE_SIGMAS * sigma:
             density = float(np.sqrt(share * noise.variance[i] * noise.step))
-            unit = f"{UNITS[CHANNELS.index(('ax', 'gx')[i])]}/sqrt(Hz)"
+            unit = f"{UNITS[channels[0]]}/sqrt(Hz)"
             off = density * sigma / share / 2
-            yield NAMES[cause.part], with_uncertainty(Quantity(density, off, unit))
+            yield NAMES[part], with_uncertainty(Quantity(density, off, unit))

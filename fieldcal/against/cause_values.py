@@ -29,7 +29,8 @@ def cause_quantities(there: WidenedSet, member: Member) -> dict[str, Quantity]:
     out = _determined_parameters(there, group, values, covariance, before)
     for shape in group.effect.shapes:
         at = group.shape[shape.name]
-        unsure = min(group.shape_sigma, at) if np.isfinite(group.shape_sigma) else None
+        sigma = group.shape_sigma(shape.name)
+        unsure = sigma if np.isfinite(sigma) else None
         out[shape.name] = Quantity(float(at), unsure, shape.unit)
     return out
 

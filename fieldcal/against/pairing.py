@@ -107,10 +107,12 @@ def _shape_of_both(mine: Group, yours: Group) -> Group | None:
 
     None if one of them does not tell it, or if its shape is an instant.
     """
-    sigma = np.array([mine.shape_sigma, yours.shape_sigma])
-    if mine.begins_at_instant or len(mine.shape) != 1 or not np.isfinite(sigma).all():
+    if mine.begins_within or len(mine.shape) != 1:
         return None
     (name,) = mine.shape
+    sigma = np.array([mine.shape_sigma(name), yours.shape_sigma(name)])
+    if not np.isfinite(sigma).all():
+        return None
     value = np.array([mine.shape[name], yours.shape[name]])
     weight = np.square(value / np.maximum(sigma, 1e-9 * value))
     mean = float(np.exp(np.average(np.log(value), weights=weight)))

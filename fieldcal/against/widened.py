@@ -191,11 +191,10 @@ def _counterpart(
     if group.effect is None or not group.shape:
         same = [v for v in alike if dict(v.shape) == dict(group.shape)]
         return here, (same or list(alike))[0]
-    (shape,) = group.effect.shapes
-    at = group.shape[shape.name] + (later if shape.kind == "instant" else 0.0)
-    near = min(
-        alike, key=lambda v: (v.origin != group.origin, abs(v.shape[shape.name] - at))
-    )
-    here, (exact,) = own.dictionary.add_shape_values(here, near, [at])
+    instants = {s.name for s in group.effect.shapes if s.kind in ("instant", "onset")}
+    at = {k: v + later * (k in instants) for k, v in group.shape.items()}
+    there = replace(group, shape=at)
+    near = min(alike, key=lambda v: (v.origin != group.origin, there.shape_distance(v)))
+    here, (exact,) = own.dictionary.add_shapes(here, near, [at])
     own.copy_turn_columns(near, exact)
     return here, exact

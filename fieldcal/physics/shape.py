@@ -15,6 +15,10 @@ POINTS = 16
 """Values of a time constant to try: an exponential changes little from one to the
 next."""
 
+ONSETS = 12
+"""Instants to try at most at which something begins to change: it changes little in the
+time of a position."""
+
 PIECES = 4
 """Instants to try within a window; the best is refined by the samples."""
 
@@ -37,15 +41,19 @@ class Shape:
     """A parameter that the outputs are not linear in, and the range to search.
 
     `kind` says what it is: a time constant of the "session", since the "turn" or since
-    each turn of a "joint", an "instant", or the "frequency" of a line, which is found
-    in the spectrum.
+    each turn of a "joint", an "instant" of a jump, the "onset" of a gradual change, or
+    the "frequency" of a line, which is found in the spectrum. `points` are the time
+    constants to try.
     """
 
     name: str
     unit: str
     low: float = 0.0
     high: float = np.inf
-    kind: Literal["session", "turn", "joint", "instant", "frequency"] = "frequency"
+    kind: Literal["session", "turn", "joint", "instant", "onset", "frequency"] = (
+        "frequency"
+    )
+    points: int = POINTS
 
     def grid(self, x: Experience, since: Array) -> Iterator[tuple[float, int]]:
         """Values to try in rows, each with the origin that times count from.
@@ -55,9 +63,11 @@ class Shape:
         span = float(np.ptp(x.t))
         if self.kind == "instant":
             yield from ((float(at), 0) for at in instants(x))
+        elif self.kind == "onset":
+            yield from ((float(at), 0) for at in onsets(x))
         elif self.kind == "session":
             low, high = max(self.low, span / 20), min(self.high, 3 * span)
-            for tau in np.geomspace(low, max(high, 1.01 * low), POINTS):
+            for tau in np.geomspace(low, max(high, 1.01 * low), self.points):
                 yield float(tau), 0
         elif self.kind in ("turn", "joint"):
             # joints know by themselves when they were turned
@@ -66,13 +76,43 @@ class Shape:
                 if not np.isfinite(soonest := float(times.min())):
                     continue  # it was never turned
                 low, high = max(self.low, soonest / 4), min(self.high, span / 3)
-                for tau in np.geomspace(low, max(high, 1.01 * low), POINTS):
+                for tau in np.geomspace(low, max(high, 1.01 * low), self.points):
                     yield float(tau), origin
 
     @property
     def finer(self) -> tuple[float, ...]:
-        """Steps to the next values to try, closer and closer: ratios, or `WITHIN`."""
-        return (1.0, *WITHIN) if self.kind == "instant" else (1.3, 1.13, FINEST)
+        """Steps to the next values to try, closer and closer.
+
+        Ratios of time constants, `WITHIN`, or parts of the time between onsets.
+        """
+        if self.kind == "instant":
+            return 1.0, *WITHIN
+        if self.kind == "onset":
+            return 0.5, 0.25, 0.12, 0.06, 0.03
+        coarse = (2.7, 1.65) if self.points < POINTS else ()
+        return *coarse, 1.3, 1.13, FINEST
+
+    def natural_step(self, x: Experience, ratio: float) -> float:
+        """The step of `finer` in the coordinate of `moved`."""
+        if self.kind == "onset":
+            return ratio * float(np.ptp(x.t)) / ONSETS
+        return float(np.log(ratio))
+
+    def moved(self, value: float, step: float) -> float:
+        """A value moved by a step of its natural coordinate.
+
+        That is the logarithm of a time constant, and an instant itself, s.
+        """
+        if self.kind in ("instant", "onset"):
+            return value + step
+        return value * float(np.exp(step))
+
+    def sigma(self, value: float, step: float) -> float:
+        """Standard uncertainty of a value by that of its natural coordinate.
+
+        That of a time constant is at most itself.
+        """
+        return step if self.kind in ("instant", "onset") else value * min(step, 1.0)
 
     def near(self, x: Experience, here: float, ratio: float) -> Sequence[float]:
         """Values about one: to either side, or every instant next to it.
@@ -80,7 +120,8 @@ class Shape:
         Of instants those between rows first, then parts of a row to either side.
         """
         if self.kind != "instant":
-            return here / ratio, here * ratio
+            step = self.natural_step(x, ratio)
+            return self.moved(here, -step), self.moved(here, step)
         if ratio < 1:
             k = int(np.argmin(np.abs(x.t - here)))
             row = float(x.lasts[k])
@@ -112,6 +153,21 @@ def instants(x: Experience) -> Array:
             near = np.abs(np.subtract.outer(cuts, inside)).argmin(axis=1)
             kept.append(rows[near])
     out: Array = between[np.unique(np.concatenate(kept))]
+    return out
+
+
+def onsets(x: Experience) -> Array:
+    """Instants at which something may begin to change gradually, s.
+
+    They lie between positions. Where these are fewer than `ONSETS`, as of one long
+    position, they divide the time evenly.
+    """
+    turned = np.flatnonzero(np.diff(x.position))
+    if len(turned) >= ONSETS:
+        turned = turned[np.linspace(0, len(turned) - 1, ONSETS).astype(int)]
+    elif len(turned) < ONSETS // 2:
+        return np.linspace(x.t.min(), x.t.max(), ONSETS + 2)[1:-1]
+    out: Array = _between_rows(x)[turned]
     return out
 
 

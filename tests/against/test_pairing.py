@@ -11,10 +11,10 @@ from fieldcal.model.causes.cause import Group
 
 
 def group(name: str, shape: dict[str, float], sigma: float) -> Group:
-    at = np.arange(1)
-    return Group(
-        name, "gyr", at, np.ones(1), catalogue()[name], shape, shape_sigma=sigma
-    )
+    at, effect = np.arange(1), catalogue()[name]
+    (value,) = shape.values()
+    known = None if np.isnan(sigma) else np.full((1, 1), (sigma / value) ** 2)
+    return Group(name, "gyr", at, np.ones(1), effect, shape, shape_covariance=known)
 
 
 def test_a_time_constant_of_both_is_by_what_each_tells_of_it() -> None:

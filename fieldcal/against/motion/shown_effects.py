@@ -52,8 +52,9 @@ def _quantities(group: Group, state: Eliminated) -> dict[str, Quantity]:
     }
     for shape in effect.shapes:
         at = float(group.shape[shape.name])
-        unsure = min(group.shape_sigma, at) if np.isfinite(group.shape_sigma) else None
-        out[shape.name] = Quantity(at, unsure, shape.unit)
+        unsure = group.shape_sigma(shape.name)
+        known = unsure if np.isfinite(unsure) else None
+        out[shape.name] = Quantity(at, known, shape.unit)
     return out
 
 

@@ -27,6 +27,7 @@ from fieldcal.model.posterior.held_out import held_out_turn_residuals, turn_resi
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.physics.effect import Scatter
+from fieldcal.physics.shape import Shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +139,7 @@ def parameter_estimates(
         known = [m for m in standing.members if shape.name in m[1].shape]
         if shape.kind == "instant":
             known = known[:1]  # estimated from all channels together
-        shapes = [shape_estimate(explanation, m) for m in known]
+        shapes = [shape_estimate(explanation, m, shape) for m in known]
         weight = np.array([1 / max(error, 1e-12) ** 2 for _, error in shapes])
         at = float(weight @ [at for at, _ in shapes] / weight.sum())
         out[shape.name] = Quantity(at, float(weight.sum() ** -0.5), shape.unit)
@@ -200,17 +201,17 @@ def _with_arrival_uncertainty(
     }
 
 
-def shape_estimate(explanation: Explanation, member: Member) -> tuple[float, float]:
+def shape_estimate(
+    explanation: Explanation, member: Member, shape: Shape
+) -> tuple[float, float]:
     """A shape parameter and its standard uncertainty.
 
     An instant is estimated from the samples, other shapes by the search.
     """
-    _, group = member
-    (value,) = group.shape.values()
-    (shape,) = group.effect.shapes  # type: ignore[union-attr]
     if shape.kind == "instant":
         return estimate_instant(explanation, member)
-    return value, min(group.shape_sigma, value)
+    _, group = member
+    return group.shape[shape.name], group.shape_sigma(shape.name)
 
 
 def column_estimates(fitted: Set, columns: Index) -> tuple[Array, Array, Array]:

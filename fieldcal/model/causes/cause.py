@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS, Array, Index, Mask
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.model import priors, tolerances
 from fieldcal.model.causes.basis import Course, General
 from fieldcal.physics.effect import Effect
@@ -57,7 +57,8 @@ class Group:
         single turn connects; empty if it acts on all
     in_state : whether the base state contains its estimate
     changes_together : whether a single cause may change all columns by the same amount
-    shape_sigma : standard uncertainty of the shape; nan unless it was refined
+    shape_covariance : (m, m) of the natural coordinates of its m shape parameters
+        (`Shape.moved`), in the effect's order; None unless they were refined
     fixed_size : v, if it is known; None if it is estimated
     random : whether it is a random process: it is not subtracted from residuals and
         not used for predictions
@@ -77,7 +78,7 @@ class Group:
     moved_positions: tuple[int, ...] = ()
     in_state: bool = False
     changes_together: bool = False
-    shape_sigma: float = np.nan
+    shape_covariance: Array | None = None
     fixed_size: float | None = None
     random: bool = False
     largest: float = np.inf
@@ -133,6 +134,28 @@ class Group:
         shapes = self.effect.shapes if self.effect and self.shape else ()
         return [s.kind for s in shapes] == ["instant"]
 
+    @property
+    def begins_within(self) -> bool:
+        """Whether it begins within the recording: by a jump, or to change gradually."""
+        shapes = self.effect.shapes if self.effect and self.shape else ()
+        return any(s.kind in ("instant", "onset") for s in shapes)
+
+    def shape_sigma(self, name: str) -> float:
+        """Standard uncertainty of a shape parameter; nan unless it was refined."""
+        if self.effect is None or self.shape_covariance is None:
+            return np.nan
+        number = [s.name for s in self.effect.shapes].index(name)
+        step = float(np.sqrt(self.shape_covariance[number, number]))
+        return self.effect.shapes[number].sigma(self.shape[name], step)
+
+    def moved_shape(self, step: Array) -> dict[str, float]:
+        """Its shape, moved by a step (m,) of the natural coordinates."""
+        shapes = self.effect.shapes if self.effect else ()
+        return {
+            s.name: s.moved(self.shape[s.name], float(d))
+            for s, d in zip(shapes, step, strict=True)
+        }
+
     def shape_distance(self, other: Group) -> float:
         """Largest relative difference of its shape from that of another group."""
         return max((abs(other.shape[k] - v) / max(abs(v), 1e-9)
@@ -181,10 +204,11 @@ class Cause:
     def simultaneous_variants(self, other: Group) -> tuple[Group, ...]:
         """Variants that begin at the same instant as a group of the same event.
 
-        These are the variants with the nearest instant. Empty if the group is of an
-        effect with which this one does not come, or that does not begin at an instant.
+        These are the variants with the nearest shape. Empty if the group is of an
+        effect with which this one does not come, or that does not begin within the
+        recording.
         """
-        if other.event != self.event or not other.begins_at_instant:
+        if other.event != self.event or not other.begins_within:
             return ()
         if other not in self._nearest:
             distances = [g.shape_distance(other) for g in self.variants]
@@ -263,36 +287,3 @@ class Cause:
     def name_and_part(self) -> tuple[str, str]:
         """Common to causes that differ only in the position they belong to."""
         return self.name, self.part
-
-
-@dataclass(frozen=True, slots=True)
-class EqualWidthGroups:
-    """Groups with equally many leading columns, stacked for joint calculation.
-
-    Attributes
-    ----------
-    blocks : (b, k) distinct sets of columns; several groups may share a set
-    block : (m,) index of each group's set of columns
-    typical : (m, k) typical sizes
-    cause, variant : (m,) indices of each group's cause and variant
-    known : (m,) whether a group's size v is known to be 1
-
-    """
-
-    blocks: Index
-    block: Index
-    typical: Array
-    cause: Index
-    variant: Index
-    known: Mask
-
-    @classmethod
-    def of(cls, groups: Sequence[tuple[int, int, Group]]) -> EqualWidthGroups:
-        """Stack groups; each is given with the indices of its cause and variant."""
-        leading = [group.leading for _, _, group in groups]
-        columns = np.array([columns for columns, _ in leading])
-        blocks, block = np.unique(columns, axis=0, return_inverse=True)
-        typical = np.array([sizes for _, sizes in leading])
-        cause, variant = np.array([(i, j) for i, j, _ in groups]).T
-        known = np.array([g.fixed_size == 1.0 for _, _, g in groups])
-        return cls(blocks, block.ravel(), typical, cause, variant, known)

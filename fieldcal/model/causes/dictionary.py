@@ -8,7 +8,7 @@ of the positions whose orientation is not known.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -21,9 +21,10 @@ from fieldcal.core.samples import Array, Index, Mask
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.basis import General
-from fieldcal.model.causes.cause import CLOSURE, Cause, EqualWidthGroups, Group
+from fieldcal.model.causes.cause import CLOSURE, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
+from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.causes.random_causes import random_causes, series_flicker
@@ -244,17 +245,14 @@ class Dictionary(ColumnTable):
             self.typical_instability[:6] = priors.INSTABILITY * self.unit * measured
             self.typical_instability[CLOSURE] = priors.CLOSURE_RAD * self.turns
 
-    def add_shape_values(
-        self, cause: Cause, group: Group, values: Sequence[float]
+    def add_shapes(
+        self, cause: Cause, group: Group, shapes: Sequence[Mapping[str, float]]
     ) -> tuple[Cause, list[Group]]:
-        """Add variants of a group at other values of its shape; the cause and these.
+        """Add variants of a group with other shapes; the cause and these.
 
         `group` is one of an effect with an equation.
         """
-        (name,) = group.shape
-        new = groups_at_points(
-            self, group, [({name: float(v)}, group.origin) for v in values]
-        )
+        new = groups_at_points(self, group, [(s, group.origin) for s in shapes])
         return self.replace_variants(cause, (*cause.variants, *new)), new
 
     def add_instants(self, instants: Sequence[float]) -> None:
@@ -262,7 +260,9 @@ class Dictionary(ColumnTable):
         for cause in self.causes:
             begin = {g.params: g for g in cause.variants if g.begins_at_instant}
             for group in begin.values():
-                cause, _ = self.add_shape_values(cause, group, instants)
+                (name,) = group.shape
+                shapes = [{name: float(at)} for at in instants]
+                cause, _ = self.add_shapes(cause, group, shapes)
 
     def expect_within(self, spans: Sequence[tuple[float, float]]) -> None:
         """Make effects that begin within these spans, s, likelier (`expected`)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -208,11 +208,11 @@ def _rows_in_motion() -> Experience:
 
 def shape_points(table: ColumnTable, effect: Effect) -> Iterator[Point]:
     """Grid points of an effect: shape parameters, with the origin of times."""
-    if not effect.shapes:
-        yield {}, 0
-    for shape in effect.shapes:
-        for value, origin in shape.grid(table.x, table.since):
-            yield {shape.name: value}, origin
+    grids = [shape.grid(table.x, table.since) for shape in effect.shapes]
+    names = [shape.name for shape in effect.shapes]
+    for point in product(*grids):
+        values = dict(zip(names, (value for value, _ in point), strict=True))
+        yield values, max((origin for _, origin in point), default=0)
 
 
 def _any_shape(effect: Effect) -> dict[str, float]:

@@ -5,7 +5,7 @@ It is the nominal state, changed by the set's columns. Source: Gauss and Newton.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -229,21 +229,24 @@ class GaussNewton:
         return float(step[counted].max(initial=0.0))
 
     def variants_near(
-        self, cause: Cause, group: Group, values: Sequence[float]
+        self, cause: Cause, group: Group, shapes: Sequence[Mapping[str, float]]
     ) -> tuple[Cause, list[Group]]:
-        """A cause with variants of a group at some values of its shape, and these.
+        """A cause with variants of a group with some shapes, and these.
 
         Existing variants are reused. In the rows of turns, new ones have the columns of
         the group.
         """
-        (name,) = group.shape
-        known = {g.shape[name]: g for g in group.with_same_parameters(cause.variants)}
-        missing = [v for v in values if v not in known]
-        cause, added = self.dictionary.add_shape_values(cause, group, missing)
+        alike = group.with_same_parameters(cause.variants)
+        known = {frozenset(g.shape.items()): g for g in alike}
+        keys = [frozenset(shape.items()) for shape in shapes]
+        wanted = dict(zip(keys, shapes, strict=True))
+        missing = [key for key in wanted if key not in known]
+        new = [wanted[key] for key in missing]
+        cause, added = self.dictionary.add_shapes(cause, group, new)
         for variant in added:
             self.copy_turn_columns(group, variant)
         known |= dict(zip(missing, added, strict=True))
-        return cause, [known[v] for v in values]
+        return cause, [known[key] for key in keys]
 
     def copy_turn_columns(self, group: Group, variant: Group) -> None:
         """Give a new variant the columns of a group in the rows of turns."""

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.cause import EqualWidthGroups
+from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.weighted_columns import SplitColumns, WeightedColumns
 from fieldcal.model.search.set_at_instability import (

@@ -15,7 +15,8 @@ import numpy as np
 
 from fieldcal.core.samples import ACC, CHANNELS, Array
 from fieldcal.model import priors, resolutions, thresholds
-from fieldcal.model.causes.cause import Cause, EqualWidthGroups, Group
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.evidence.eliminated import Eliminated, noticeable_gains
 from fieldcal.model.evidence.sets import Set, SetKey, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member, Sizes

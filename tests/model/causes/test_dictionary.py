@@ -383,7 +383,7 @@ def test_chances_are_shared_among_variants_and_follow_changes() -> None:
     cause, width = d.causes[at], d.width
     shown = d.shown.copy()
     shown[5] = d.shown[5] = True
-    (more, (new,)) = d.add_shape_values(cause, cause.variants[3], [7.5])
+    (more, (new,)) = d.add_shapes(cause, cause.variants[3], [{"tau_s": 7.5}])
     assert d.causes[at] is more and more.variants[:-1] == cause.variants
     assert more.variants[-1] is new and new.shape == {"tau_s": 7.5}
     assert new.params == cause.variants[3].params

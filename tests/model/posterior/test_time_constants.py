@@ -53,7 +53,7 @@ def test_each_time_constant_is_elsewhere_once_up_and_once_down() -> None:
         moved = sets_at_other_time_constants(found)
         assert len(moved) == 2 * n == 2 * (1 + both)
         for i, (_, group) in enumerate(found.best.members):
-            step = np.sqrt(n) * group.shape_sigma / group.shape["tau_s"]
+            step = np.sqrt(n) * group.shape_sigma("tau_s") / group.shape["tau_s"]
             own = [s.members[i][1].shape["tau_s"] for s in moved]
             there = sorted({float(np.log(t / group.shape["tau_s"])) for t in own})
             np.testing.assert_allclose(there, [-step, 0.0, step][:: 1 + (n == 1)],
@@ -77,7 +77,7 @@ def test_an_amplitude_is_uncertain_by_what_the_time_constant_moves_it() -> None:
     sets = [(s, 0.5) for s in sets_at_other_time_constants(found)]
     (whole,) = np.diag(average_over_sets(sets, lambda s: pick_columns(
         s, s.members[0][1].columns[:1]))[1])  # fmt: skip
-    tau, sigma = group.shape["tau_s"], group.shape_sigma
+    tau, sigma = group.shape["tau_s"], group.shape_sigma("tau_s")
     system = found.fit.system
     assert isinstance(system, WindowSystem)
     y = system.rows.y[:, 0]

@@ -26,7 +26,6 @@ from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.physics.shape import FINEST
 
 X = ladder(4)
 EFFECTS = catalogue()
@@ -71,8 +70,9 @@ def test_a_time_constant_is_found_between_the_points_of_its_grid() -> None:
     found = settling()
     ((cause, group),) = found.best.members
     assert cause.key == "settling:acc"
-    assert 0.0 < group.shape_sigma < 0.05 * TAU
-    assert abs(group.shape["tau_s"] - TAU) < 4 * group.shape_sigma
+    unsure = group.shape_sigma("tau_s")
+    assert 0.0 < unsure < 0.05 * TAU
+    assert abs(group.shape["tau_s"] - TAU) < 4 * unsure
     (term,) = found.state.terms
     assert term.shape == group.shape and term.effect is EFFECTS["settling"]
     sigma = np.sqrt(np.diag(found.best.state.inverse))
@@ -249,26 +249,6 @@ def test_wanted_are_columns_of_the_set_and_what_is_always_there() -> None:
     assert some[own.small_rotation : own.small_rotation + 18].all()
 
 
-def test_the_top_of_a_parabola_is_where_it_is() -> None:
-    """Three scores a ratio apart, and how sharp it is."""
-    d = dictionary(X)
-    fit = GaussNewton(WindowSystem(rows_of(X, np.zeros((len(X), 6))), d), nominal())
-    refinement = Refinement(fit, nominal(), np.zeros(d.width), Sizes((), ()))
-    cause = next(c for c in d.causes if c.key == "settling:acc")
-    here = cause.variants[4]
-    at, sharp = here.shape["tau_s"], 40.0
-    top = 0.3 * np.log(FINEST)
-    scores = [-0.5 * sharp * (k * np.log(FINEST) - top) ** 2 for k in (0, -1, 1)]
-    own = ((cause, here),)
-    ((_, group),) = refinement._at_parabola_top(at, own, 0, scores)
-    found = group.shape["tau_s"]
-    assert found == pytest.approx(at * FINEST**0.3)
-    assert group.shape_sigma == pytest.approx(found / sharp**0.5)
-    beyond = [0.0, -5.0, 4.0]
-    ((_, group),) = refinement._at_parabola_top(at, own, 0, beyond)
-    assert group.shape["tau_s"] == pytest.approx(at * FINEST), "no further than a step"
-
-
 def test_what_begins_at_a_refined_instant_may_be_of_any_kind() -> None:
     """A jump of a bias in the last position is a knock at the base too, as exactly."""
     x = ladder(6)
@@ -324,7 +304,9 @@ def test_members_that_begin_together_are_moved_together() -> None:
     assert [c.key for c, _ in found] == [c.key for c, _ in own]
     assert [g.params for _, g in found] == [(1,), (5,)]
     scores = refinement._scores(
-        refinement._trial_sets(own, [0, 1], [*sorted(begins), at])[1:]
+        refinement._trial_sets(
+            own, [0, 1], [{"at_s": t} for t in (*sorted(begins), at)]
+        )[1:]
     )
     assert scores[2] >= max(scores)
     assert scores[2] > max(scores[:2]) or at in begins
@@ -332,7 +314,7 @@ def test_members_that_begin_together_are_moved_together() -> None:
     ((_, moved), (_, kept)) = refinement.refine_shape(own, [0])
     assert kept is own[1][1] and moved.params == (1,)
     # a jump has no parabola, and no time constant
-    assert all(np.isnan(g.shape_sigma) for _, g in found)
+    assert all(g.shape_covariance is None for _, g in found)
 
 
 def test_the_largest_step_is_that_of_the_state_in_its_deviations() -> None:

@@ -45,7 +45,8 @@ USUAL: Mapping[str, float] = {
 TIMED = (
     *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift", "bias_step"),
     *("settling", "hum", "base_step", "mount_slip", "joint_creep"),
-    *("scale_drift", "scale_step"),
+    *("scale_drift", "scale_step", "scale_warm_up"),
+    *("thermal_transient", "scale_transient"),
 )
 EQUATIONS = (*USUAL, *TIMED, "sway", "time_delay", "heading_error")
 """Effects with numbers that can be made larger and smaller."""
@@ -103,6 +104,11 @@ def drawn(name: str, rng: np.random.Generator, span: float) -> Values:
         "scale_drift": {n: float(rng.normal(0, 2e-3 / span)) for n in "xyz"},
         "scale_step": {n: float(rng.normal(0, 1e-3)) for n in "xyz"}
         | {"at_s": float(rng.uniform(0.25, 0.75) * span)},
+        "scale_warm_up": {n: float(rng.normal(0, 2e-3)) for n in "xyz"}
+        | {"tau_s": float(rng.uniform(0.3, 1.0) * span)},
+        "thermal_transient": both | _onset(rng, span),
+        "scale_transient": {n: float(rng.normal(0, 2e-3)) for n in "xyz"}
+        | _onset(rng, span),
         "settling": both | {"tau_s": float(rng.uniform(2.5, 10.0))},
         "hum": _along(rng, 5e-3, 4e-4) | {"hz": float(rng.uniform(0.5, 9.0))},
         "time_delay": {"seconds": float(rng.uniform(0.003, 0.03))},
@@ -114,6 +120,14 @@ def drawn(name: str, rng: np.random.Generator, span: float) -> Values:
         },
     }
     return more[name]
+
+
+def _onset(rng: np.random.Generator, span: float) -> Values:
+    """When something begins to change gradually, and how fast."""
+    return {
+        "at_s": float(rng.uniform(0.15, 0.6) * span),
+        "tau_s": float(rng.uniform(0.1, 0.5) * span),
+    }
 
 
 def _along(rng: np.random.Generator, acc: float, gyr: float) -> Values:

@@ -27,9 +27,11 @@ APART = (
     {
         *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift"),
         *("bias_step", "base_step", "mount_slip", "scale_drift", "scale_step"),
+        *("thermal_transient", "scale_transient", "scale_warm_up"),
     },
     {"temperature_bias", "temperature_scale"},
     {"temperature_scale", "scale_drift", "scale_step"},
+    {"temperature_scale", "scale_warm_up", "scale_transient"},
     {"gyro_scale", "gyro_cross_coupling", "angle_scale", "angle_offset", "sway"},
     {"lever_arm", "time_delay", "sway", "hum"},
     {"settling", "joint_creep"},
@@ -202,7 +204,7 @@ def outside(name: str, rng: np.random.Generator, sigmas: float) -> Session:
         session = calm(plain(rng))
         channel = int(rng.integers(3))
         which = int(rng.integers(1, len(session.windows)))
-        if name == "fading scale":
+        if name == "fading coupling":
             session = replace(session, thermometer=False)
         there = size(replace(session, added=_adding(name, channel, which, 1e-3)))
         shown = there > 1e-6 and 1e-3 * sigmas / there < 0.1
@@ -291,8 +293,8 @@ def _hysteresis(session: Session, t: Array, channel: int, which: int) -> Array:
 
 
 def _fading(session: Session, t: Array, channel: int, which: int) -> Array:
-    """A scale factor that warms up."""
-    force = _force(session)[:, channel]
+    """A cross-coupling that fades as the device warms up."""
+    force = _force(session)[:, (channel + 1) % 3]
     course: Array = force[_held(session, t)] * np.exp(-3 * t / t[-1])
     return course
 
@@ -314,5 +316,5 @@ OUTSIDE: Mapping[str, Course] = {
     "cubic in time": _cubic,
     "one position off": _odd_one,
     "hysteresis": _hysteresis,
-    "fading scale": _fading,
+    "fading coupling": _fading,
 }

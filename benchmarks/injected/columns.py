@@ -69,9 +69,18 @@ def _of_time(name: str, numbers: Mapping[str, float], parts: Parts) -> Columns:
         return each((parts.t > numbers.get("at_s", np.inf)).astype(float))
     if name == "warm_up":
         return each(np.exp(-t / numbers.get("tau_s", np.inf)))
+    if name == "thermal_transient":
+        return each(_approach(parts, numbers))
     if name == "settling":
         return each(np.exp(-parts.since / numbers.get("tau_s", np.inf)))
     return []
+
+
+def _approach(parts: Parts, numbers: Mapping[str, float]) -> Array:
+    """From zero to one, from an instant on."""
+    since = np.maximum(parts.t - numbers.get("at_s", np.inf), 0.0)
+    out: Array = 1 - np.exp(-since / numbers.get("tau_s", np.inf))
+    return out
 
 
 def _of_time_and_force(
@@ -80,6 +89,8 @@ def _of_time_and_force(
     courses = {
         "scale_drift": parts.t - parts.t[0],
         "scale_step": (parts.t > numbers.get("at_s", np.inf)).astype(float),
+        "scale_warm_up": np.exp(-(parts.t - parts.t[0]) / numbers.get("tau_s", np.inf)),
+        "scale_transient": _approach(parts, numbers),
     }
     if name not in courses:
         return []

@@ -96,7 +96,7 @@ def test_a_bump_is_judged_by_name_and_by_number() -> None:
 ONCE_MISSED = [
     ("warm_up", 91_019_001),  # what fades was taken off the way twice
     ("warm_up", 91_019_004),  # what wanders in a single window made up for it
-    ("outside: fading scale", 91_047_002),  # of one axis alone
+    ("outside: fading coupling", 91_047_002),  # of one axis alone
     ("pair", 93_100_030),  # two on accelerometers, one on gyroscopes as well
     ("pair", 93_100_037),
     ("pair", 93_200_005),  # six of nine parameters made up for the other

@@ -89,7 +89,10 @@ def test_says_what_it_is(effect: Effect) -> None:
 @pytest.mark.parametrize("effect", [e for e in FITTED if e.absent], ids=lambda e: e.id)
 def test_adds_nothing_when_it_is_said_to_be_absent(effect: Sensor) -> None:
     """After a warm-up, at the start and its temperature, before a step."""
-    place = {"since_start": 1e6 if effect.id == "warm_up" else 0.0, "warming": 0.0}
+    place = {
+        "since_start": 1e6 if effect.absent == "when warmed up" else 0.0,
+        "warming": 0.0,
+    }
     x = Experience.at_rest(
         np.zeros(1), np.zeros(1), 9.8, **{k: np.full(1, v) for k, v in place.items()}
     )

@@ -34,6 +34,8 @@ def felt() -> Experience:
     [
         ("scale_drift", T),
         ("scale_step", np.array([0.0, 0.0, 0.25, 1.0])),
+        ("scale_warm_up", np.exp(-T / 8.0)),
+        ("scale_transient", np.array([0.0, 0.0, 0.0, 1 - np.exp(-19.5 / 8.0)])),
         ("temperature_scale", np.array([0.0, 1.0, -2.0, 3.0])),
     ],
 )
@@ -42,7 +44,7 @@ def test_each_accelerometer_changes_by_its_own_force(name: str, course: Array) -
     x, effect = felt(), catalogue()[name]
     assert isinstance(effect, Sensor)
     values = np.array([2.0, -3.0, 5.0])
-    out = effect.change_of_outputs(x, values, {"at_s": 10.5})
+    out = effect.change_of_outputs(x, values, {"at_s": 10.5, "tau_s": 8.0})
     np.testing.assert_allclose(out[:, :3], course[:, None] * x.f * values)
     assert not out[:, 3:].any()
 
@@ -59,6 +61,15 @@ def test_where_a_thermometer_shows_a_change_a_drift_is_that_of_the_temperature()
     [
         {"scale_drift": {"x": -2e-5, "y": -2e-5, "z": -2e-5}},
         {"scale_step": {"x": 4e-3, "y": -3e-3, "z": 2e-3, "at_s": 7.0}},
+        {
+            "scale_transient": {
+                "x": 8e-3,
+                "y": -6e-3,
+                "z": 6e-3,
+                "at_s": 7.0,
+                "tau_s": 60,
+            }
+        },
     ],
 )
 @pytest.mark.thorough
@@ -79,6 +90,8 @@ def test_scale_factors_are_those_of_the_end(
     said = json.loads(capsys.readouterr().out)
     assert said["carried"]["causes"][name] > 0.9
     lasted = taken[-1]["end_s"] if name == "scale_drift" else 1.0
+    if "tau_s" in values:
+        lasted = -np.expm1(-(taken[-1]["end_s"] - values["at_s"]) / values["tau_s"])
     change = lasted * np.array([values[i] for i in "xyz"])
     found = said["parameters"]["acc_scale"]
     off = np.array(found["value"]) - profile.truth.acc_scale - change

@@ -69,6 +69,17 @@ def differ(one: Block, other: Block) -> bool:
         ("scale_drift:x=1e-5,z=-2e-5", [-0.006, 0, -0.0096, 0, 0, 0]),
         ("scale_step:y=1e-3,at_s=60", [0, -6.4e-3, 0, 0, 0, 0]),
         ("scale_step:y=1e-3,at_s=160", [0] * 6),
+        ("scale_warm_up:y=1e-3,tau_s=50", [0, -6.4e-3 * np.exp(-2), 0, 0, 0, 0]),
+        (
+            "scale_transient:y=1e-3,at_s=60,tau_s=20",
+            [0, -6.4e-3 * (1 - np.exp(-2)), 0, 0, 0, 0],
+        ),
+        ("scale_transient:y=1e-3,at_s=160,tau_s=20", [0] * 6),
+        (
+            "thermal_transient:az=0.02,gz=-1e-3,at_s=60,tau_s=20",
+            [0, 0, 0.02 * (1 - np.exp(-2)), 0, 0, -1e-3 * (1 - np.exp(-2))],
+        ),
+        ("thermal_transient:az=0.02,gz=-1e-3,at_s=160,tau_s=20", [0] * 6),
         ("thermal_hysteresis:az=0.5,gx=0.01", [0, 0, 0.005, 1e-4, 0, 0]),
         (
             "warm_up:ay=0.01,gx=1e-3,tau_s=50",

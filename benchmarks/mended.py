@@ -117,6 +117,24 @@ SESSIONS = (
         of_all=True,
     ),
     Session(
+        75102784,
+        ("sun",),
+        "5.7 sigma: heated from the first minute on, by a course that no effect had",
+        of_all=True,
+    ),
+    Session(
+        75102926,
+        ("sun",),
+        "6.5 sigma: heated from the last position but one on, scale factors too",
+        of_all=True,
+    ),
+    Session(
+        75102950,
+        ("table kicked",),
+        "18 sigma: a base that is kicked amid a position whose angles nobody knows",
+        of_all=True,
+    ),
+    Session(
         75102241,
         ("slips in its mount",),
         "123 sigma: a step of the bias has the square of an angle, a linear turn not",

@@ -13,7 +13,7 @@ from fieldcal.core.rotation import cross_matrix, rotation_matrices
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import NO_SHAPE, Separable
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.shape import Shape
+from fieldcal.physics.shape import Shape, knocks
 from fieldcal.physics.step import step_course
 
 
@@ -43,8 +43,9 @@ class AttitudeStep(Separable):
         return x.w
 
     def applies(self, x: Experience) -> bool:
-        """Where the angles of more than one position are known."""
-        return len(np.unique(x.position[at_rest_in_known_position(x)])) > 1
+        """Where the angles of more than one position are known, or one was knocked."""
+        known = np.unique(x.position[at_rest_in_known_position(x)])
+        return len(known) > 1 or bool(knocks(x).any())
 
     def acts_on(self, x: Experience) -> bool:
         """In any position: on the rows after it there, and on the turn that follows."""

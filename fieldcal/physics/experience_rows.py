@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.samples import Index
 from fieldcal.physics.experience import Experience
 
 PER_ROW = (
@@ -19,9 +20,11 @@ PER_ROW = (
 """Fields of `Experience` that have one value per row."""
 
 
-def select_rows(x: Experience, rows: Sequence[int]) -> Experience:
+def select_rows(x: Experience, rows: Sequence[int] | Index) -> Experience:
     """The rows of these indices."""
-    selected: dict[str, Any] = {n: getattr(x, n)[list(rows)] for n in PER_ROW}
+    selected: dict[str, Any] = {
+        n: getattr(x, n)[np.asarray(rows, dtype=np.intp)] for n in PER_ROW
+    }
     return replace(x, **selected)
 
 

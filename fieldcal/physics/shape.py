@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Mask
 from fieldcal.physics.experience import Experience
 
 POINTS = 16
@@ -143,8 +143,7 @@ def instants(x: Experience) -> Array:
     """
     between = _between_rows(x)
     turned = np.flatnonzero(np.diff(x.position))
-    ends, starts = x.t[:-1] + x.lasts[:-1] / 2, x.t[1:] - x.lasts[1:] / 2
-    kept = [turned, np.flatnonzero((starts - ends > BREAK_S) & (x.lasts[1:] > 0))]
+    kept = [turned, np.flatnonzero(knocks(x))]
     for rows in np.split(np.arange(len(x.t)), turned + 1):
         pieces = max(PIECES, INSTANTS // (len(turned) + 1))
         cuts = np.linspace(x.t[rows[0]], x.t[rows[-1]], pieces + 1)[1:-1]
@@ -168,6 +167,14 @@ def onsets(x: Experience) -> Array:
     elif len(turned) < ONSETS // 2:
         return np.linspace(x.t.min(), x.t.max(), ONSETS + 2)[1:-1]
     out: Array = _between_rows(x)[turned]
+    return out
+
+
+def knocks(x: Experience) -> Mask:
+    """Whether something was left out of a window between two rows, (n - 1,)."""
+    ends, starts = x.t[:-1] + x.lasts[:-1] / 2, x.t[1:] - x.lasts[1:] / 2
+    here = (x.position[1:] == x.position[:-1]) & (x.position[1:] >= 0)
+    out: Mask = here & (starts - ends > BREAK_S) & (x.lasts[1:] > 0)
     return out
 
 

@@ -14,6 +14,7 @@ from fieldcal.model.causes.basis import Course, General
 from fieldcal.model.causes.cause import TRIADS, Basis
 from fieldcal.model.causes.wander import Wander
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.experience_rows import select_rows
 
 
 class ColumnTable:
@@ -30,6 +31,7 @@ class ColumnTable:
     Attributes
     ----------
     observed : channels that were measured
+    measured, measured_since : `x` and `since` of rows in which some channel was
     window_positions : positions that have a window
     bases : functions that calculate columns, each with its first column
     width : number of columns
@@ -45,6 +47,9 @@ class ColumnTable:
     ) -> None:
         self.x, self.used, self.since, self.unit = x, used, since, unit
         self.observed = np.flatnonzero(np.any(used, axis=0))
+        rows = np.any(used, axis=1)
+        self.measured = x if rows.all() else select_rows(x, np.flatnonzero(rows))
+        self.measured_since = since[:, rows]
         self.window_positions = np.unique(x.position)
         self.position_count = int(x.position.max()) + 1
         self.wander = wander

@@ -39,7 +39,9 @@ def effect_causes(table: ColumnTable) -> Iterator[Cause]:
     for effect in catalogue().values():
         if not isinstance(effect, Motion | Sensor) or not effect.params:
             continue
-        if effect.applies(table.x) and (grid := list(shape_points(table, effect))):
+        if effect.applies(table.measured) and (
+            grid := list(shape_points(table, effect))
+        ):
             yield from _causes_of_effect(table, effect, grid)
 
 
@@ -208,7 +210,8 @@ def _rows_in_motion() -> Experience:
 
 def shape_points(table: ColumnTable, effect: Effect) -> Iterator[Point]:
     """Grid points of an effect: shape parameters, with the origin of times."""
-    grids = [shape.grid(table.x, table.since) for shape in effect.shapes]
+    x, since = table.measured, table.measured_since
+    grids = [shape.grid(x, since) for shape in effect.shapes]
     names = [shape.name for shape in effect.shapes]
     for point in product(*grids):
         values = dict(zip(names, (value for value, _ in point), strict=True))

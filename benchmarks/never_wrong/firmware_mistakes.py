@@ -50,7 +50,9 @@ def supply_falls(written: Written, bench: Bench, rng: Rng) -> Written:
     still = (np.exp(-s.t / tau) - np.exp(-end / tau)) / (1 - np.exp(-end / tau))
     at_zero = rng.integers(2) * rng.uniform(2.0, 5.0) * STANDARD
     more = log_uniform(rng, 2e-4, 1e-2) * still[:, None]
-    acc = s.acc + more * (s.acc + at_zero)
+    # it falls before the converter: what that rounded off is drawn anew
+    before = s.acc + bench.grain * rng.uniform(-0.5, 0.5, s.acc.shape)
+    acc = before + more * (before + at_zero)
     if bench.grain:
         acc = np.round(acc / bench.grain) * bench.grain
     return replace(written, samples=replace(s, acc=acc))

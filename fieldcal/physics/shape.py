@@ -88,9 +88,8 @@ class Shape:
         if self.kind == "instant":
             return 1.0, *WITHIN
         if self.kind == "onset":
-            return 0.5, 0.25, 0.12, 0.06, 0.03
-        coarse = (2.7, 1.65) if self.points < POINTS else ()
-        return *coarse, 1.3, 1.13, FINEST
+            return 0.5, 0.15, 0.04
+        return (2.7, 1.4, FINEST) if self.points < POINTS else (1.3, 1.13, FINEST)
 
     def natural_step(self, x: Experience, ratio: float) -> float:
         """The step of `finer` in the coordinate of `moved`."""

@@ -9,6 +9,7 @@ in the weights of the rows, so it needs no columns.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,6 @@ class CurrentAlignment:
     ----------
     rows : rows at that alignment
     change : (n, 6) time derivatives of force, m/s^3, and rate, rad/s^2
-    hidden : (n, 6) what noise of the reference hides of them
 
     """
 
@@ -47,7 +47,12 @@ class CurrentAlignment:
         self.change = rows.motion(rows.gyr, 1)
         if rows.gyr is not rows.acc:
             self.change[:, ACC] = rows.motion(rows.acc, 1)[:, ACC]
-        self.hidden = rows.hidden()
+        self.__dict__.pop("hidden", None)
+
+    @cached_property
+    def hidden(self) -> Array:
+        """What noise of the reference hides of the rows, (n, 6), if it is asked for."""
+        return self.rows.hidden()
 
 
 class MotionDictionary(Dictionary):

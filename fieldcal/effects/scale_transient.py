@@ -17,6 +17,7 @@ array([ 0.   , -6.321])
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from fieldcal.core.samples import Array
 from fieldcal.effects.thermal_transient import ThermalTransient
@@ -28,7 +29,7 @@ class ScaleTransient(ScaleChange):
     """Exponential change of the accelerometers' scale factors from an instant on."""
 
     params = tuple(Param(i, "1", 3e-3) for i in "xyz")
-    shapes = ThermalTransient.shapes
+    shapes = tuple(replace(s, points=1) for s in ThermalTransient.shapes)
     event = "thermal_transient"
     covariate = "time × force"
     seen_in = "time"

@@ -16,6 +16,7 @@ array([-3.679])
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from fieldcal.core.samples import Array
 from fieldcal.effects.warm_up import WarmUp
@@ -27,7 +28,7 @@ class ScaleWarmUp(ScaleChange):
     """Exponential change of the accelerometers' scale factors since power-on."""
 
     params = tuple(Param(i, "1", 3e-3) for i in "xyz")
-    shapes = WarmUp.shapes
+    shapes = tuple(replace(s, points=3) for s in WarmUp.shapes)
     event = "warm_up"
     covariate = "time × force"
     seen_in = "time"

@@ -67,8 +67,8 @@ class Shape:
             yield from ((float(at), 0) for at in onsets(x))
         elif self.kind == "session":
             low, high = max(self.low, span / 20), min(self.high, 3 * span)
-            for tau in np.geomspace(low, max(high, 1.01 * low), self.points):
-                yield float(tau), 0
+            for tau in self._time_constants(low, high):
+                yield tau, 0
         elif self.kind in ("turn", "joint"):
             # joints know by themselves when they were turned
             origins = since[:1] if self.kind == "joint" else since
@@ -76,8 +76,15 @@ class Shape:
                 if not np.isfinite(soonest := float(times.min())):
                     continue  # it was never turned
                 low, high = max(self.low, soonest / 4), min(self.high, span / 3)
-                for tau in np.geomspace(low, max(high, 1.01 * low), self.points):
-                    yield float(tau), origin
+                for tau in self._time_constants(low, high):
+                    yield tau, origin
+
+    def _time_constants(self, low: float, high: float) -> list[float]:
+        """Time constants to try from `low` to `high`, s; one in the middle of them."""
+        high = max(high, 1.01 * low)
+        if self.points == 1:
+            return [float(np.sqrt(low * high))]
+        return [float(tau) for tau in np.geomspace(low, high, self.points)]
 
     @property
     def finer(self) -> tuple[float, ...]:

@@ -42,8 +42,8 @@ class ScaleTransient(ScaleChange):
     source = "first-order heating of a package, 0.02 %/K, 5 to 30 K"
 
     def chance(self, x: Experience) -> float:
-        """Of three hundred sessions one; less where a thermometer shows a change."""
-        return BEYOND if x.warms else 3e-3
+        """Of a thousand sessions one alone; less where a thermometer shows a change."""
+        return BEYOND if x.warms else 1e-3
 
     def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """The approach to the new value, (1)."""

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import BEYOND, CHANCE, NO_SHAPE, BiasChange, six
+from fieldcal.physics.effect import BEYOND, NO_SHAPE, BiasChange, six
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
 
@@ -46,8 +46,11 @@ class ThermalTransient(BiasChange):
     source = "first-order heating of a package, 100 to 2000 s"
 
     def chance(self, x: Experience) -> float:
-        """Less where a thermometer shows what changes anyway."""
-        return BEYOND if x.warms else CHANCE
+        """Of three hundred sessions one; less where a thermometer shows a change.
+
+        A device that warms up from the start, which is more frequent, resembles it.
+        """
+        return BEYOND if x.warms else 3e-3
 
     def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """The approach to the new value on every output, (1)."""

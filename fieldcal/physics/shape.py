@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -120,26 +120,6 @@ class Shape:
         """
         return step if self.kind in ("instant", "onset") else value * min(step, 1.0)
 
-    def near(self, x: Experience, here: float, ratio: float) -> Sequence[float]:
-        """Values about one: to either side, or every instant next to it.
-
-        Of instants those between rows first, then parts of a row to either side.
-        """
-        if self.kind != "instant":
-            step = self.natural_step(x, ratio)
-            return self.moved(here, -step), self.moved(here, step)
-        if ratio < 1:
-            k = int(np.argmin(np.abs(x.t - here)))
-            row = float(x.lasts[k])
-            if row == 0 or abs(float(x.t[k]) - here) > 0.6 * row:
-                return []  # between windows: their rows do not tell
-            return [here + part * ratio * row for part in (-2, -1, 1, 2)]
-        between, grid = _between_rows(x), instants(x)
-        low = grid[grid < here].max(initial=-np.inf)
-        high = grid[grid > here].min(initial=np.inf)
-        found: list[float] = between[(low < between) & (between < high)].tolist()
-        return [at for at in found if at != here]
-
 
 def instants(x: Experience) -> Array:
     """Instants at which something may change: between rows, some for each window, s.
@@ -159,6 +139,24 @@ def instants(x: Experience) -> Array:
             kept.append(rows[near])
     out: Array = between[np.unique(np.concatenate(kept))]
     return out
+
+
+def instants_near(x: Experience, here: float, part: float) -> list[float]:
+    """Instants about one: every one between rows next to it, or parts of a row away.
+
+    `part` is one of `WITHIN`, or 1 for those between rows.
+    """
+    if part < 1:
+        k = int(np.argmin(np.abs(x.t - here)))
+        row = float(x.lasts[k])
+        if row == 0 or abs(float(x.t[k]) - here) > 0.6 * row:
+            return []  # between windows: their rows do not tell
+        return [here + steps * part * row for steps in (-2, -1, 1, 2)]
+    between, grid = _between_rows(x), instants(x)
+    low = grid[grid < here].max(initial=-np.inf)
+    high = grid[grid > here].min(initial=np.inf)
+    found: list[float] = between[(low < between) & (between < high)].tolist()
+    return [at for at in found if at != here]
 
 
 def onsets(x: Experience) -> Array:

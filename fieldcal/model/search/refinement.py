@@ -18,6 +18,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
+from fieldcal.physics.shape import instants_near
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ class Refinement:
         if shapes[0].kind == "instant":
             (shape,) = shapes
             for part in shape.finer:
-                near = shape.near(x, members[sharing[0]][1].shape[shape.name], part)
+                near = instants_near(x, members[sharing[0]][1].shape[shape.name], part)
                 shared = [{shape.name: at} for at in near]
                 members = self._likeliest(members, sharing, shared)
             return members

@@ -1,5 +1,7 @@
 """Runs that are killed, and cables that are pulled: what is lost, and what is wrong.
 
+    python -m benchmarks kills [RUNS]
+
 A run against a virtual device in another process, which goes on meanwhile, is killed at
 random instants (SIGKILL) and gone on with by ``--resume``, again and again until it is
 done; or the link hangs up at random instants. Instants are counted in bytes recorded,
@@ -20,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._words import how_many
 from fieldcal.calibration import Calibration
 from fieldcal.commands.table import true_values
 from fieldcal.core.positions import FIVE_POSITIONS
@@ -252,6 +255,8 @@ def show(kind: str, outcomes: list[Outcome]) -> None:
 
 
 def main() -> None:
-    """Print what 200 killed runs and 100 runs with pulled cables come to."""
-    for kind, runs in (("killed", KILLED), ("pulled", PULLED)):
+    """Print what killed runs, and half as many with pulled cables, come to."""
+    killed = how_many(KILLED)
+    pulled = max(killed * PULLED // KILLED, 1)
+    for kind, runs in (("killed", killed), ("pulled", pulled)):
         show(kind, series(kind, runs))

@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         if left:
             with worker_pool(args) as pool:
                 process_with_progress(batch, left, pool)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, InputError):  # as of a store that is gone for good
         sys.stderr.write(
             "fieldcal batch: what was finished is stored; the same command with"
             " --resume goes on with the others\n"

@@ -148,19 +148,28 @@ def test_no_go_is_not_called_not_good(
     assert says in said and "column error" not in said
 
 
-def test_who_interrupts_a_batch_hears_how_it_goes_on(
+@pytest.mark.parametrize(
+    ("ends", "code"), [(KeyboardInterrupt(), 130), (InputError("the store is gone"), 2)]
+)
+def test_who_hears_that_a_batch_ended_hears_how_it_goes_on(
+    ends: BaseException,
+    code: int,
     tree: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def pressed(*_: object) -> None:
-        raise KeyboardInterrupt
+    """Interrupted, or as the store went away for good."""
 
-    monkeypatch.setattr(progress, "process_with_progress", pressed)
+    def ended(*_: object) -> None:
+        raise ends
+
+    monkeypatch.setattr(progress, "process_with_progress", ended)
     call = ["batch", str(tree), "--history", str(tmp_path / "h"), "-o"]
-    assert main([*call, str(tmp_path / "t.parquet")]) == 130
-    assert "is stored; the same command with --resume" in capsys.readouterr().err
+    assert main([*call, str(tmp_path / "t.parquet")]) == code
+    said = capsys.readouterr().err
+    assert "is stored; the same command with --resume" in said
+    assert str(ends) in said
 
 
 def test_a_row_has_the_folder_that_was_asked_for(tree: Path, tmp_path: Path) -> None:

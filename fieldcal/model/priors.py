@@ -106,6 +106,10 @@ LEAN_CHANCE, LEAN_RAD = 0.1, 2e-4
 """Probability that the support of a device gives way while it rests, and typical angle,
 rad: tyres, foam and grass yield by tenths of a milliradian in a minute."""
 
+STOP_SETTLING_CHANCE, STOP_SETTLING_RAD = 0.01, 1e-3
+"""Probability that a device goes on turning for seconds after it was put down, and
+typical angle, rad: foam, a hand that lets go, the joints of a fixture."""
+
 SINK_CHANCE, SINK_RAD, SINK_FADING = 0.02, 5e-4, 0.2
 """Probability that the base of a fixture turns during the session, typical angle, rad,
 and ratio of each polynomial to the one before: a tripod on soil or a bending table

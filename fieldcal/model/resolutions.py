@@ -59,6 +59,10 @@ as many as a smooth one at least. The prior of the fastest smooth course makes f
 ones negligible; 80 are one for some seconds of a session of minutes, and what they
 leave of a random course is nearly white."""
 
+STOP_SETTLING_S = (1.0, 2.0, 5.0, 12.0)
+"""Time constants of a device that goes on turning after it was put down, s. Their sum
+follows one of 1 to 12 s to within 2 % of its start, from a quarter of a second on."""
+
 COSINES_PER_VISIBLE = 2.0
 """Cosines used over those that exceed the noise of the rows each."""
 

@@ -15,6 +15,7 @@ from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.leaning import leaning
+from fieldcal.model.causes.settling_stops import settling_stops
 from fieldcal.model.causes.sinking import sinking
 from fieldcal.model.causes.turn_gyro_errors import turn_gyro_errors
 from fieldcal.physics.effect import CHANCE, Scatter
@@ -27,15 +28,18 @@ def random_causes(table: ColumnTable) -> Iterator[Cause]:
     for effect in catalogue().values():
         if isinstance(effect, Scatter) and effect.applies(table.x):
             yield from _causes_of_scatter(table, effect, oriented)
-    if (
-        len(table.window_positions) >= thresholds.MIN_ALIKE
-    ):  # else it is a permanent group
+    several = len(table.window_positions) >= thresholds.MIN_ALIKE
+    if several:  # else it is a permanent group
         for group in _cosine_flicker(table):
             yield Cause(
                 group.cause, group.part, priors.FLICKER_CHANCE, (group,), "noise"
             )
     if (leans := leaning(table)) is not None:
         yield Cause(leans.cause, leans.part, priors.LEAN_CHANCE, (leans,), "noise")
+    if several and (stops := settling_stops(table)) is not None:
+        yield Cause(
+            stops.cause, stops.part, priors.STOP_SETTLING_CHANCE, (stops,), "noise"
+        )
     if (sinks := sinking(table)) is not None:
         yield Cause(sinks.cause, sinks.part, priors.SINK_CHANCE, (sinks,), "noise")
     if table.turns:

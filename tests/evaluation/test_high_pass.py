@@ -46,7 +46,7 @@ def recorded(folder: Path, tau: float) -> Session:
     return Session.open(write_session(folder, block, strapdown.schedule(), site=site))
 
 
-@pytest.mark.parametrize("tau", [700.0, 2e4])
+@pytest.mark.parametrize("tau", [pytest.param(700.0, marks=pytest.mark.thorough), 2e4])
 def test_it_is_named_and_refused(tmp_path: Path, tau: float) -> None:
     session = recorded(tmp_path / "s", tau)
     found = diagnose(session.block, session.about)

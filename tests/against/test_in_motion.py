@@ -203,6 +203,7 @@ def test_a_long_delay_is_no_filter_of_either_triad() -> None:
     assert np.abs(pulls(one, found)).max() < 4.5
 
 
+@pytest.mark.thorough
 def test_a_filter_that_is_nothing_beside_a_delay_is_tried_all_the_same() -> None:
     """Linearised about no filter it explains less than a delay leaves."""
     one, found, _ = compared(26, 34_800)
@@ -425,6 +426,7 @@ def test_a_command_is_patched_until_it_moves_as_the_recording(
     assert patch["effects"]["lever_arm"]["x"] == pytest.approx(0.2, abs=2e-3)
 
 
+@pytest.mark.thorough
 def test_noise_of_the_reference_is_no_filter_of_the_device() -> None:
     """Quick motion below that noise looks as if it had gone through a low-pass."""
     one, found, _ = compared(0, 5000, seconds=60.0, hz=50.0, noise=8.0)

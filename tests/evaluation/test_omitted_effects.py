@@ -138,6 +138,7 @@ def test_a_drift_is_in_the_result(
     )
 
 
+@pytest.mark.thorough
 def test_flicker_that_moves_the_instant_of_the_biases_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -121,7 +121,7 @@ def test_an_onset_and_a_time_constant_are_those_of_least_squares() -> None:
     assert np.median(rises) == pytest.approx(0.5, rel=0.3)
 
 
-@pytest.mark.parametrize("draws", [12, pytest.param(60, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("draws", [8, pytest.param(60, marks=pytest.mark.thorough)])
 def test_an_onset_is_as_uncertain_as_it_says(draws: int) -> None:
     """Over many draws; of both shape parameters with their correlation."""
     rng = np.random.default_rng(8)

@@ -191,7 +191,7 @@ def _counterpart(
     if group.effect is None or not group.shape:
         same = [v for v in alike if dict(v.shape) == dict(group.shape)]
         return here, (same or list(alike))[0]
-    instants = {s.name for s in group.effect.shapes if s.kind in ("instant", "onset")}
+    instants = {s.name for s in group.effect.shapes if s.is_instant}
     at = {k: v + later * (k in instants) for k, v in group.shape.items()}
     there = replace(group, shape=at)
     near = min(alike, key=lambda v: (v.origin != group.origin, there.shape_distance(v)))

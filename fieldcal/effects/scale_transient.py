@@ -33,12 +33,9 @@ class ScaleTransient(ScaleChange):
     event = "thermal_transient"
     covariate = "time × force"
     seen_in = "time"
-    absent = "before it begins"
-    decided_by = "a longer recording, until the change has died out"
-    cure = (
-        "Shade the device, or wait until it has the temperature of its use; take the "
-        "positions after the instant again."
-    )
+    absent = ThermalTransient.absent
+    decided_by = ThermalTransient.decided_by
+    cure = ThermalTransient.cure
     source = "first-order heating of a package, 0.02 %/K, 5 to 30 K"
 
     def chance(self, x: Experience) -> float:

@@ -32,9 +32,9 @@ class ScaleWarmUp(ScaleChange):
     event = "warm_up"
     covariate = "time × force"
     seen_in = "time"
-    absent = "when warmed up"
-    decided_by = "a longer recording, until the change has died out"
-    cure = "Switch the device on earlier: three times tau_s before the first window."
+    absent = WarmUp.absent
+    decided_by = WarmUp.decided_by
+    cure = WarmUp.cure
     source = "first-order warm-up of a package, 0.02 %/K, 5 to 30 K"
 
     def chance(self, x: Experience) -> float:

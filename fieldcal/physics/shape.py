@@ -55,6 +55,11 @@ class Shape:
     )
     points: int = POINTS
 
+    @property
+    def is_instant(self) -> bool:
+        """Whether it is when something begins, by a jump or gradually."""
+        return self.kind in ("instant", "onset")
+
     def grid(self, x: Experience, since: Array) -> Iterator[tuple[float, int]]:
         """Values to try in rows, each with the origin that times count from.
 
@@ -109,7 +114,7 @@ class Shape:
 
         That is the logarithm of a time constant, and an instant itself, s.
         """
-        if self.kind in ("instant", "onset"):
+        if self.is_instant:
             return value + step
         return value * float(np.exp(step))
 
@@ -118,7 +123,7 @@ class Shape:
 
         That of a time constant is at most itself.
         """
-        return step if self.kind in ("instant", "onset") else value * min(step, 1.0)
+        return step if self.is_instant else value * min(step, 1.0)
 
 
 def instants(x: Experience) -> Array:

@@ -138,7 +138,7 @@ class Group:
     def begins_within(self) -> bool:
         """Whether it begins within the recording: by a jump, or to change gradually."""
         shapes = self.effect.shapes if self.effect and self.shape else ()
-        return any(s.kind in ("instant", "onset") for s in shapes)
+        return any(s.is_instant for s in shapes)
 
     def shape_sigma(self, name: str) -> float:
         """Standard uncertainty of a shape parameter; nan unless it was refined."""

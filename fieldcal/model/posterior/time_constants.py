@@ -56,7 +56,7 @@ def _independent_steps(group: Group) -> list[Array]:
     """
     if group.effect is None or group.shape_covariance is None:
         return []
-    logs = [s.kind not in ("instant", "onset") for s in group.effect.shapes]
+    logs = [not s.is_instant for s in group.effect.shapes]
     columns = np.linalg.cholesky(group.shape_covariance).T
     longest = np.abs(columns[:, logs]).max(axis=1, initial=0.0)
     part = np.minimum(thresholds.MAX_SHAPE_LOG_SIGMA / np.maximum(longest, 1e-9), 1.0)

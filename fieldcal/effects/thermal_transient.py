@@ -3,7 +3,7 @@
     U_i += A_i [1 - exp(-(t - t_0) / tau)],    W_i the same,    t >= t_0           (1)
 
 t_0 = at_s, device time, s; A m/s^2 and rad/s. The sun comes out or goes, a heater or
-another unit beside the device is switched on: it approaches another temperature, with
+another unit beside it is switched on: the device approaches another temperature, with
 a time constant of its own. Seen without a thermometer, or beyond what it explains.
 Source: first-order heating of a package, as for `warm_up`.
 

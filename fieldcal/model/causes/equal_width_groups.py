@@ -1,4 +1,4 @@
-"""Groups of columns that are as many, for calculations of many at once."""
+"""Groups with the same number of columns, stacked for joint calculation."""
 
 from __future__ import annotations
 

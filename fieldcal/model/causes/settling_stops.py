@@ -1,8 +1,8 @@
-"""Stops in which the device goes on turning for a while after it was put down.
+"""Settling stops: the device goes on turning for seconds after it was put down.
 
 Foam, grass, a hand that lets go and the joints of a fixture give way quickly first and
-slowly then. In a stop whose orientation is not set by known angles, the angle about
-each of three axes, two across the force and one along it, is
+slowly then. In a stop of unknown orientation, the angle about each of three axes, two
+across the force and one along it, is
 
     theta_i(t) = sum_k a_ik exp(-(t - t_0) / tau_k),                                (1)
 
